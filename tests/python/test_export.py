@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import resource
 import struct
 from collections import Counter
 from pathlib import Path
@@ -86,6 +87,22 @@ def test_c3d_is_read_alike_by_two_readers(walk, tmp_path):
     )
     assert [row[:2] for row in got] == [row[:2] for row in wanted]
     np.testing.assert_allclose([row[2] for row in got], [row[2] for row in wanted], atol=1e-4)
+
+
+def test_a_c3d_that_the_disk_has_no_space_for_leaves_the_old_file(walk, tmp_path, capsys):
+    pytest.importorskip("ezc3d", reason="ezc3d is not installed: extra mocap")
+    whole = export(walk, tmp_path, ".c3d").stat().st_size
+    old = tmp_path / "old.c3d"
+    old.write_text("old")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for size in (0, 100, 512, 4096, 8192, whole - 512):
+        try:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+            assert gait.cli.main(["export", str(walk.path), "-o", str(old)]) == 1
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        assert "old.c3d: File too large; choose another place" in capsys.readouterr().err
+        assert old.read_text() == "old" and len(list(tmp_path.iterdir())) == 2
 
 
 def test_the_skeleton_of_constant_lengths_is_at_the_joints(walk):

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import math
+import os
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +14,9 @@ from gait.export.motion import Motion
 
 _LABELS = (("strike", "Foot Strike"), ("off", "Foot Off"))
 _SOFTWARE = "libgait"
+_BLOCK = 512  # bytes
+_PLACE = 16  # bytes of a point in a frame: x, y, z and residual
+_SPACE = 1 << 16  # bytes, more than a disk has on which the last write failed
 
 
 def write(path: Path, motion: Motion) -> int:
@@ -43,4 +50,18 @@ def write(path: Path, motion: Motion) -> int:
         file.add_parameter("EVENT", "TIMES", np.stack([seconds // 60, seconds % 60]))
         file.add_parameter("EVENT", "SUBJECTS", [motion.name] * len(events))
     file.write(str(path))
+    _require_complete(path, points[0].size)
     return len(events)
+
+
+def _require_complete(path: Path, places: int) -> None:
+    """OSError if the file is cut off: ezc3d reports no failure to write, such as that of a full disk."""
+    with path.open("r+b") as file:
+        header = file.read(_BLOCK)
+        data = struct.unpack_from("<H", header, 16)[0] if len(header) == _BLOCK else 0  # first block, from 1
+        end = _BLOCK * (data - 1 + math.ceil(places * _PLACE / _BLOCK))
+        if data > 1 and file.seek(0, os.SEEK_END) >= end:  # ezc3d writes `data` last
+            return
+        file.seek(0, os.SEEK_END)
+        file.write(bytes(max(end, _SPACE)))  # fails for the reason for which ezc3d could not write
+    raise OSError(errno.EIO, os.strerror(errno.EIO), str(path))
