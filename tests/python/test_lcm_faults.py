@@ -1,6 +1,7 @@
 """gait-trackd with bad input: one line that names file, field and remedy; exit code 1, or 2 for usage."""
 
 import json
+import os
 import re
 
 import lcm_rig as rig
@@ -69,6 +70,20 @@ def test_files_that_are_not_there(tmp_path):
         fails(options(tmp_path, option, nothing), nothing, what, "No such file")
     fails(rig.command("--config", nothing)[1:], nothing, "configuration", code=2)
     fails(rig.command("--url", f"file://{nothing}?speed=0")[1:], nothing, "cannot open this log")
+
+
+def test_a_pipe_is_refused_at_once(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    fails(["-m", pipe], pipe, "not a regular file", "model")
+    camera = tmp_path / "camera.json"
+    camera.write_text(json.dumps(CAMERA))
+    for option in ("--camera", "--init"):
+        fails(options(tmp_path, option, pipe), pipe, "not a regular file", option[2:])
+    fails(
+        options(tmp_path, "--camera", camera, "--background", pipe), pipe, "not a regular file", "background"
+    )
+    fails(rig.command("--config", pipe)[1:], pipe, "not a regular file", "configuration", code=2)
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,15 @@
 #include "gait.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
+#include <unistd.h>
 
 /* ---- messages and clocks ---- */
 bool message_set(message *m, const char *format, ...)
@@ -93,18 +96,17 @@ enum { MAX_FILE = 1 << 25 };
 
 static bool read_stream(FILE *f, const char *path, const char *what, file_bytes *out, message *why)
 {
-    long size = -1;
-    if (fseek(f, 0, SEEK_END) == 0)
-        size = ftell(f);
-    if (size < 0 || size > MAX_FILE || fseek(f, 0, SEEK_SET) != 0)
+    struct stat is;
+    if (fstat(fileno(f), &is) != 0 || !S_ISREG(is.st_mode) || is.st_size > MAX_FILE)
         return message_set(why, "%s: not a regular file, or larger than 32 MiB; give the name of a %s file",
                            path, what);
-    out->data = aligned_memory((size_t)size + 1, path, why);
+    size_t const size = (size_t)is.st_size;
+    out->data = aligned_memory(size + 1, path, why);
     if (!out->data)
         return false;
-    out->size = fread(out->data, 1, (size_t)size, f);
+    out->size = fread(out->data, 1, size, f);
     out->data[out->size] = '\0';
-    if (out->size == (size_t)size)
+    if (out->size == size)
         return true;
     free(out->data);
     *out = (file_bytes){0};
@@ -114,9 +116,14 @@ static bool read_stream(FILE *f, const char *path, const char *what, file_bytes 
 bool file_read(const char *path, const char *what, file_bytes *out, message *why)
 {
     *out = (file_bytes){0};
-    FILE *const f = fopen(path, "rb");
-    if (!f)
-        return message_set(why, "%s: cannot open the %s file: %s", path, what, strerror(errno));
+    int const file = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC); /* a pipe would wait for its writer */
+    FILE *const f = file >= 0 ? fdopen(file, "rb") : NULL;
+    if (!f) {
+        message_set(why, "%s: cannot open the %s file: %s", path, what, strerror(errno));
+        if (file >= 0)
+            close(file);
+        return false;
+    }
     bool const ok = read_stream(f, path, what, out, why);
     fclose(f);
     return ok;
