@@ -164,7 +164,7 @@ STRIKE_SIDES = ("right", "left")
 _FLAT_FOOT_STRIDES = np.linspace(0.10, 0.30, 5)  # strides after the strike, when the foot is flat
 _SWING = np.linspace(0.12, 0.26, 8)  # strides before the strike, when the toe passes the other foot
 _SHORTEST_CONTACT = 0.15  # strides; sprinters' last about 0.2
-_OWN_TRACK_M = 0.05  # most between a track and the mean of its own draws
+_OWN_TRACK_M = 0.01  # most between a track and the mean of its own draws
 MATCHING_STRIKES_S = 0.25  # seconds; events further apart are not the same
 
 
@@ -318,16 +318,17 @@ class Draws:
         draws = Draws(**arrays)
         if not np.array_equal(draws.frame, track.frame):
             raise UserError(f"{path}: its frames are not those of the track; give the draws made with it")
-        apart = np.linalg.norm(draws._pelvis() - track.places["pelvis"], axis=1)  # the track is their mean
-        if float(np.median(apart)) > _OWN_TRACK_M:
-            words = f"its positions are {np.median(apart):.2f} m from those of the track"
+        apart = draws._distance(track)  # the track is their mean
+        if apart > _OWN_TRACK_M:
+            words = f"its joints are {apart:.2f} m from those of the track"
             raise UserError(f"{path}: {words}; give the draws made with it")
         return draws
 
-    def _pelvis(self) -> Array:
-        """Mean positions (n, 3) of the pelvis, metres, world."""
-        pelvis = self.joints[:, :, self.joint_names.index("pelvis")]
-        return np.asarray(pelvis.mean(axis=0, dtype=float))
+    def _distance(self, track: Track) -> float:
+        """Median distance of the joints' mean places from those of a track with the same frames, metres."""
+        mean = self.joints.mean(axis=0, dtype=float)
+        there = np.stack([track.places[name] for name in self.joint_names], axis=1)
+        return float(np.median(np.linalg.norm(mean - there, axis=2)))
 
 
 _ARRAYS = ("frame", "time", "joint_names", "angle_names", "joints", "angles", "phase")
