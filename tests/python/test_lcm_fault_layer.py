@@ -100,6 +100,7 @@ def test_a_limit_of_memory_is_one_clear_line(tmp_path):
     )
     assert ended.returncode == 1 and "frames 0 " in ended.stdout, ended
     assert re.match("gait-trackd: tracker: not enough memory for 2[0-9]{8} bytes\n", ended.stderr), ended
+    assert all("not enough memory" in line for line in ended.stderr.splitlines()), ended
 
 
 def test_at_every_size_of_the_address_space_a_start_without_memory_is_one_line():

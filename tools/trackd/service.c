@@ -249,20 +249,25 @@ static bool begin_anew(service *s, further_camera *c, message *why)
     return made;
 }
 
+/* Why there is no camera; none if the text is empty.  A new reason is reported with the next frame. */
+static void set_refused(service *s, const message *why)
+{
+    if (why->text[0] && strcmp(s->refused.text, why->text) != 0)
+        s->idle = SERVICE_IDLE_NOT;
+    s->refused = *why;
+}
+
 void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, int64_t arrival)
 {
     camera_slot *const slot = c ? &c->slot : &s->slot;
     gait_camera camera;
     message why, refused = {.text = ""};
-    if (!take_camera(s, slot, c ? c->stream : s->stream, msg, &camera, &refused))
+    if (!take_camera(s, slot, c ? c->stream : s->stream, msg, &camera, &refused)) {
         service_complain(s, "%s", refused.text);
-    if (!c) {
-        if (refused.text[0] && strcmp(s->refused.text, refused.text) != 0)
-            s->idle = SERVICE_IDLE_NOT; /* the new reason is reported with the next frame */
-        s->refused = refused;
-    }
-    if (refused.text[0])
+        if (!c)
+            set_refused(s, &refused);
         return;
+    }
     if (s->path && (!slot->known || same_lens(&camera, &slot->camera))) {
         if (!pose_path_add(s->path, msg->utime, &camera, &why))
             service_complain(s, "%s", why.text);
@@ -278,8 +283,10 @@ void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, 
                          !s->path && same_lens(&camera, &slot->camera)
                              ? "; if the camera moves, run with --moving-camera"
                              : "");
-    else if (answer == CAMERA_NEW && !begin_anew(s, c, &why))
-        service_complain(s, "%s", why.text);
+    else if (answer == CAMERA_NEW && !begin_anew(s, c, &refused))
+        service_complain(s, "%s", refused.text);
+    if (!c || refused.text[0])
+        set_refused(s, &refused);
 }
 
 void service_further_background(service *s, further_camera *c, const image_view *v)

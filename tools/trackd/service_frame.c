@@ -339,7 +339,7 @@ static void set_lack(const service *s, int idle, message *why)
     if (idle == SERVICE_IDLE_CAMERA && unknown)
         message_set(why, "no camera: announce it on GAIT_CAMERA_%d", unknown->stream);
     else if (idle == SERVICE_IDLE_CAMERA && s->refused.text[0])
-        message_set(why, "no camera: %.200s", s->refused.text);
+        message_set(why, "no usable camera: %.200s", s->refused.text);
     else if (idle == SERVICE_IDLE_CAMERA)
         message_set(why, "no camera: give --camera or announce it on GAIT_CAMERA_%d", i);
     else if (idle == SERVICE_IDLE_START)
