@@ -184,13 +184,10 @@ class Scene:
         motion, moved = None, ""
         if not options.camera_path:
             poses, motion, moved = _camera_motion(options, video, camera, samples, people, given)
-        if moved and options.cameras_out:
-            remedy = (
-                "--camera-path gives its poses" if options.stabilize == "auto" else "try --stabilize auto"
-            )
+        if moved and options.cameras_out and options.stabilize == "auto":  # by default it counts as still
             raise UserError(
                 f"{options.cameras_out}: not written, as the camera {moved} and its motion is not estimated; "
-                f"{remedy}, or leave out --cameras-out"
+                "--camera-path gives its poses, or leave out --cameras-out"
             )
         calibration = None
         if camera is None:
