@@ -74,7 +74,8 @@ def test_a_camera_that_cannot_be_is_refused_in_log_and_status():
         stream = [("GAIT_CAMERA_0", nowhere), *rig.frames(0, 1)]
         listener.ask(stream, lambda s: s.state == s.WAITING and s.text.startswith(fault), "the refusal")
         words = finish().words
-    assert words.count(f"gait-trackd: {fault}") == 1 and f"frames arrive, but no usable camera: {fault}" in words
+    assert words.count(f"gait-trackd: {fault}") == 1
+    assert f"frames arrive, but no usable camera: {fault}" in words
 
 
 def test_live_it_reports_where_it_listens_and_what_it_lacks():

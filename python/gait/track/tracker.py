@@ -42,7 +42,7 @@ class Tracker:
     Attributes
     ----------
     memory_bytes, isa : int, str
-        Size of the memory that the filter uses; the instruction set in use: scalar, base, sse4, avx2 or avx512.
+        Size of the memory that the filter uses; the instruction set: scalar, base, sse4, avx2 or avx512.
     step_seconds : float
         Time that the last `step` spent in the C library.
     start_stature_sd : float
