@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import resource
 from dataclasses import replace
 
 import cv2
@@ -281,6 +282,18 @@ def test_render_a_pose(tmp_path, scene):
     words = ["render", "--state", tmp_path / "state.json", "--camera", scene / "camera.json"]
     assert main([str(w) for w in (*words, "-o", tmp_path / "shown.png")]) == 0
     assert cv2.imread(str(tmp_path / "shown.png")).shape == (240, 320, 3)
+
+
+def test_a_picture_that_the_disk_has_no_space_for_is_one_line(tmp_path, capfd):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+        assert main(["render", "--phase", "0.3", "-o", str(tmp_path / "pose.png")]) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    err = capfd.readouterr().err
+    assert err == f"gait render: {tmp_path}/pose.png: File too large; choose another place\n"
+    assert not list(tmp_path.iterdir())
 
 
 def test_render_a_sheet(tmp_path):

@@ -14,9 +14,13 @@ from pathlib import Path
 import pytest
 
 import gait
+from gait.batch import project
 from gait.bindings import abi
 from gait.bindings.config import TrackerConfig
+from gait.body.skeleton import JOINTS
 from gait.cli import COMMANDS, _joined, _parser, main, parser_of, values
+from gait.errors import UserError
+from gait.io import keypoints_file
 
 
 @pytest.mark.parametrize(
@@ -132,6 +136,35 @@ def test_too_little_memory_is_one_line(tmp_path):
     done = subprocess.run([sys.executable, "-c", limited], capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr
     assert done.stderr.count("\n") == 1 and done.stderr.startswith("gait simulate: not enough memory")
+
+
+def test_an_error_without_a_text_still_states_the_remedy(monkeypatch, capsys):
+    def fail(_):
+        raise MemoryError
+
+    monkeypatch.setattr("gait.cli.info.run", fail)
+    assert main(["info", "walk"]) == 1
+    assert capsys.readouterr().err == "gait info: not enough memory: close other programs or give less\n"
+
+
+def test_a_full_standard_output_is_named():
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "gait", "info", "walk"],
+            stdout=full, stderr=subprocess.PIPE, text=True, env=environment, check=False,
+        )  # fmt: skip
+    assert (done.returncode, done.stderr) == (1, "gait info: standard output: No space left on device\n")
+
+
+@pytest.mark.parametrize(
+    ("read", "what"),
+    [(project.read, "project"), (lambda path: keypoints_file.read(path, JOINTS), "file of keypoints")],
+)
+def test_a_device_which_may_never_end_is_refused(read, what):
+    words = f"/dev/null: is a device or a pipe, not a file; write the {what} to a file first"
+    with pytest.raises(UserError, match=words):
+        read("/dev/null")
 
 
 HELP = """

@@ -15,6 +15,7 @@ from gait._version import __version__
 from gait.camera.camera import split_name
 from gait.errors import UserError, unreadable
 from gait.io.fields import Fields, parsing
+from gait.io.files import require_no_device
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -127,6 +128,7 @@ def read(path: str | os.PathLike[str]) -> list[Clip]:
     UserError if the file or an entry in it is invalid.  If a clip's own files are missing or damaged, only
     that clip fails, when it is run.
     """
+    require_no_device(path, "project")
     try:
         text = Path(path).read_bytes()
     except OSError as error:

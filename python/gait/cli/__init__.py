@@ -104,13 +104,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(text, file=sys.stderr)
         return 1
     except BrokenPipeError:  # the reader of our output has closed it, which is not our failure
-        with contextlib.suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence()
         return 1
     except MemoryError as exc:
-        return _failed(command, f"not enough memory: {exc or 'close other programs or give less at a time'}")
+        return _failed(command, f"not enough memory: {str(exc) or 'close other programs or give less'}")
     except OSError as exc:
-        return _failed(command, f"{exc.filename or 'file'}: {exc.strerror or exc}")
+        return _failed(command, f"{exc.filename or _unnamed()}: {exc.strerror or exc}")
     except KeyboardInterrupt:
         return _failed(command, "interrupted")
 
@@ -125,6 +124,22 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
         parser.prog = f"gait {args.command}"
         parser.error(f"unrecognized arguments: {' '.join(unknown)}; see {parser.prog} --help")
     return args
+
+
+def _unnamed() -> str:
+    """Name what an OSError without a file name is about: the standard output if it cannot be written."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        _silence()
+        return "standard output"
+    return "file"
+
+
+def _silence() -> None:
+    """Discard what is left to print, which Python would try again at exit."""
+    with contextlib.suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _failed(command: str, text: str) -> int:

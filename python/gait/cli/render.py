@@ -51,10 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw the picture and write it."""
-    import cv2
-
     from gait.bindings.model import Model
     from gait.camera.camera import Camera
+    from gait.io.video import write_picture
     from gait.report.drawing import default_view, draw_sheet, draw_standing
 
     require_outputs((args.output,), (args.model, args.camera, args.state))
@@ -68,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         camera = Camera.read(args.camera) if args.camera else default_view(state)
         picture = draw_standing(model, state, camera)
     with replacing(args.output) as temporary:
-        cv2.imwrite(str(temporary), picture)
+        write_picture(temporary, picture)
     return 0
 
 

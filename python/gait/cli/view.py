@@ -120,8 +120,7 @@ def _serve(
 def _save(
     args: argparse.Namespace, url: str, streams: tuple[int, ...], model: Model, cameras: dict[int, Camera]
 ) -> None:
-    import cv2
-
+    from gait.io.video import write_picture
     from gait.live.feed import Feed
 
     pictures: list[Image] = []
@@ -141,4 +140,4 @@ def _save(
         if not pictures:
             why = feed.damage or "is gait-trackd tracking on this URL?"
             raise UserError(f"received no estimate with its frame and camera; {why}")
-        cv2.imwrite(str(path), pictures[0])
+        write_picture(path, pictures[0])

@@ -145,12 +145,18 @@ def require_file(path: str | os.PathLike[str], what: str, remedy: str = "check t
     file = Path(path)
     if file.is_dir():
         raise UserError(f"{path}: is a folder; give the {what} itself")
-    if file.exists() and not file.is_file():
-        raise UserError(f"{path}: is a device or a pipe, not a file; write the {what} to a file first")
+    require_no_device(path, what)
     if not file.is_file():
         raise UserError(f"{path}: no such {what}; {remedy}")
     if file.stat().st_size == 0:
         raise UserError(f"{path}: is empty; copy or make the {what} again")
+
+
+def require_no_device(path: str | os.PathLike[str], what: str) -> None:
+    """Raise UserError if `path` is a device or a pipe, which may have no end; `what` it should be."""
+    file = Path(path)
+    if file.exists() and not file.is_file() and not file.is_dir():
+        raise UserError(f"{path}: is a device or a pipe, not a file; write the {what} to a file first")
 
 
 def require_writable(path: str | os.PathLike[str]) -> None:

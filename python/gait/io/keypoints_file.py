@@ -25,7 +25,7 @@ from gait.errors import UserError
 from gait.io.detections import Clip, one_person
 from gait.io.detector_formats import KNOWN, Reader, reader_of
 from gait.io.fields import frame_numbers, table_rows
-from gait.io.files import replacing
+from gait.io.files import replacing, require_no_device
 
 Array = NDArray[np.float64]
 
@@ -216,6 +216,7 @@ def read(
     clip = clip or Clip()
     if not Path(path).exists():
         raise UserError(f"{path}: no such file of keypoints; check the name")
+    require_no_device(path, "file of keypoints")
     if (reader := reader_of(path)) is not None:
         return _read_foreign(path, reader, known, clip)
     head, rows = _table(path)

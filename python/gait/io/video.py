@@ -406,6 +406,13 @@ def read_plate(path: str | os.PathLike[str], size: tuple[int, int]) -> Image:
     return np.asarray(plate, np.uint8)
 
 
+def write_picture(path: Path, picture: Image) -> None:
+    """Write a BGR or grey picture in the format of the file's suffix; OSError names what is wrong."""
+    import cv2
+
+    path.write_bytes(cv2.imencode(path.suffix, picture)[1].tobytes())  # OpenCV's own writer states no reason
+
+
 def background(choice: str, video: Video, progress: Callable[[int], None] | None = None) -> Image | None:
     """Make the plate for the ``--background`` option: ``auto`` (median), ``none`` or an image file."""
     if choice == "none":

@@ -11,7 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from gait._version import __version__
@@ -19,7 +18,7 @@ from gait.bindings.initial import DEFAULT_SD
 from gait.camera.path import CameraPose, write_path
 from gait.errors import UserError
 from gait.io.files import replacing, require_writable
-from gait.io.video import VideoWriter
+from gait.io.video import VideoWriter, write_picture
 from gait.simulate.body import BONE_INDEX, SIDES
 from gait.simulate.geometry import Array, Ints, Picture
 from gait.simulate.render import DEFOCUS_PX, SHUTTER, Renderer, develop, light
@@ -401,8 +400,7 @@ def _write_video(
 
 def _write_picture(path: Path, picture: Picture) -> None:
     with replacing(path) as temporary:
-        if not cv2.imwrite(str(temporary), picture):
-            raise UserError(f"{path}: cannot be written; check the disk")
+        write_picture(temporary, picture)
 
 
 def _write_json(path: Path, data: dict[str, Any]) -> None:
