@@ -3,8 +3,9 @@
 
     sbom.py PACKAGES.json -o SBOM.json
 
-Adds the shared libraries inside the packages, Eigen in the C library, and the files that `--fetch` downloads:
-the detector's weights and the parts of pages.  `make sbom` calls this.
+Adds the hashes of python/lock.txt, licences that packages do not declare, the shared libraries inside the
+packages, Eigen in the C library, and the files that `--fetch` downloads: the detector's weights and the parts
+of pages.  `make sbom` calls this.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import re
 import sys
 from importlib.metadata import PackageNotFoundError, files, version
 from pathlib import Path
@@ -22,6 +24,13 @@ from gait.io.files import replacing
 from gait.io.published import Published
 from gait.web import parts
 
+LOCK = Path(__file__).resolve().parents[1] / "python/lock.txt"
+UNDECLARED = {  # SPDX identifiers of packages whose metadata names none; from the licence files inside them
+    "ezc3d": "MIT",
+    "lcm": "LGPL-2.1-only",
+    "partd": "BSD-3-Clause",
+    "protobuf": "BSD-3-Clause",
+}
 LICENCES = {  # SPDX identifiers of downloaded files
     **dict.fromkeys(weights.STORE.files, "Apache-2.0"),
     parts.THREE: "MIT",
@@ -45,7 +54,8 @@ def main() -> int:
 
 def complete(document: dict[str, Any]) -> dict[str, Any]:
     """Add to the bill what packages contain, what is compiled into libgait, and what is downloaded."""
-    packages = [one | within(one["name"]) for one in document["components"]]
+    locked = hashes_of(LOCK.read_text())
+    packages = [described(one, locked) | within(one["name"]) for one in document["components"]]
     eigen = {
         "type": "library",
         "name": "Eigen",
@@ -54,6 +64,36 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
         "licenses": [{"license": {"id": "MPL-2.0"}}],
     }
     return document | {"components": [*packages, eigen, *map(fetched, LICENCES)]}
+
+
+def hashes_of(lock: str) -> dict[tuple[str, str], list[str]]:
+    """SHA-256 of the files of each release in lock.txt, by the package's name and its version."""
+    entries = re.findall(r"^([\w.-]+)==(\S+)((?:.*\\\n)*.*)", lock, re.MULTILINE)
+    return {
+        (normal(name), number): re.findall(r"--hash=sha256:(\w+)", rest) for name, number, rest in entries
+    }
+
+
+def normal(name: str) -> str:
+    """Name of a package as in lock.txt."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def described(package: dict[str, Any], locked: dict[tuple[str, str], list[str]]) -> dict[str, Any]:
+    """Add to a package its licence, if it declares none, and the hashes of the files of its release."""
+    name, number = normal(package["name"]), package.get("version", "")
+    found = dict(package)
+    if not found.get("licenses") and name in UNDECLARED:
+        found["licenses"] = [{"license": {"id": UNDECLARED[name]}}]
+    if hashes := locked.get((name, number)):
+        files = {
+            "type": "distribution",
+            "url": f"pkg:pypi/{name}@{number}",
+            "comment": "the files of the release, of which one is installed",
+            "hashes": [{"alg": "SHA-256", "content": one} for one in hashes],
+        }
+        found["externalReferences"] = [*found.get("externalReferences", ()), files]
+    return found
 
 
 def fetched(file: Published) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """The bill of materials lists what no Python package states."""
 
 import importlib.util
+import re
 from pathlib import Path
 
 from gait.detect import weights
@@ -14,13 +15,21 @@ def test_the_bill_has_what_is_compiled_in_inside_wheels_and_fetched():
     sbom = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(sbom)
     packages = [{"name": "av", "type": "library"}, {"name": "no-such-package", "type": "library"}]
+    lock = sbom.LOCK.read_text()
+    number = re.search(r"^lcm==(\S+)", lock, re.MULTILINE)[1]
+    packages.append({"name": "LCM", "version": number, "type": "library"})
     bill = sbom.complete({"components": packages, "bomFormat": "CycloneDX"})
     assert bill["bomFormat"] == "CycloneDX"
     found = {one["name"]: one for one in bill["components"]}
     inside = {one["name"].split("-")[0]: one for one in found["av"]["components"]}
     assert {"libavcodec", "libx264"} <= inside.keys()
     assert len(inside["libavcodec"]["hashes"][0]["content"]) == 64
-    assert "components" not in found["no-such-package"]
+    assert found["no-such-package"] == packages[1]
+    assert found["LCM"]["licenses"] == [{"license": {"id": "LGPL-2.1-only"}}]
+    files = found["LCM"]["externalReferences"][0]["hashes"]
+    (entry,) = re.findall(r"^lcm==(?:.*\\\n)+.*", lock, re.MULTILINE)
+    assert len(files) == entry.count("--hash") > 10
+    assert all(f"--hash=sha256:{one['content']}" in entry for one in files)
     assert found["Eigen"]["licenses"] == [{"license": {"id": "MPL-2.0"}}]
     for file in (*weights.STORE.files, *parts.STORE.files):
         assert found[file.file]["hashes"] == [{"alg": "SHA-256", "content": file.sha256}]
