@@ -132,6 +132,7 @@ static bool instruction_sets(bench *b)
                                      GAIT_CPU_BASE | GAIT_CPU_AVX2,
                                      GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512};
     enum { SETS = sizeof masks / sizeof *masks };
+    _Static_assert(SETS == BENCH_SETS, "a result for each set");
     bench_plan plans[SETS];
     int count = 0;
     for (int k = 0; k < SETS; k++)
