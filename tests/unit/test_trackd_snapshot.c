@@ -137,7 +137,7 @@ static file_bytes content(void)
 {
     file_bytes file;
     message why;
-    CHECK(file_read(path, "snapshot", &file, &why));
+    CHECK(file_read(path, "snapshot", SNAPSHOT_MOST, &file, &why));
     return file;
 }
 
@@ -257,6 +257,21 @@ static void test_leftovers(void)
     }
 }
 
+/* That of eight people with 10,000 particles each has 62 MB. */
+static void test_large(void)
+{
+    snapshot_file f = {.path = path};
+    file_bytes file;
+    message why;
+    CHECK(save(0, 0) && truncate(path, (off_t)FILE_MOST + 1) == 0);
+    CHECK(!file_read(path, "model", FILE_MOST, &file, &why) && strstr(why.text, "larger than 32 MiB"));
+    file = content();
+    CHECK(file.size == (size_t)FILE_MOST + 1 && !resume(f.path, &s, &file, &why));
+    CHECK(strstr(why.text, "checksum") != NULL);
+    free(file.data);
+    unlink(path);
+}
+
 /* While no person is tracked the file is removed, if it is our own; what is none of ours is neither removed nor replaced. */
 static void test_own(void)
 {
@@ -285,6 +300,7 @@ int main(void)
     test_torn();
     test_leftovers();
     test_own();
+    test_large();
     unlink(path);
     unlink(model);
     rmdir(folder);

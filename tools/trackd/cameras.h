@@ -21,8 +21,9 @@ bool camera_same(const gait_camera *a, const gait_camera *b);
 enum { CAMERA_SILENT = 10000000 }; /* microseconds; cameras are announced every two seconds */
 
 typedef struct camera_slot {
-    bool known, fixed,
-        provisional; /* fixed: from --camera; provisional: from a snapshot, not yet announced */
+    bool known;
+    bool fixed;       /* from --camera */
+    bool provisional; /* from a snapshot, not yet announced */
     gait_camera camera;
     gait_camera other;   /* announced, but not the one in use */
     int64_t other_since; /* arrival of its first message since the one in use was announced; -1: none */

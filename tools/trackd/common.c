@@ -91,15 +91,13 @@ void *aligned_memory(size_t bytes, const char *what, message *why)
 }
 
 /* ---- files ---- */
-/* Bytes, far more than any model, camera or image has: a device or a wrong file must not fill the memory. */
-enum { MAX_FILE = 1 << 25 };
-
-static bool read_stream(FILE *f, const char *path, const char *what, file_bytes *out, message *why)
+static bool read_stream(FILE *f, const char *path, const char *what, file_most most, file_bytes *out,
+                        message *why)
 {
     struct stat is;
-    if (fstat(fileno(f), &is) != 0 || !S_ISREG(is.st_mode) || is.st_size > MAX_FILE)
-        return message_set(why, "%s: not a regular file, or larger than 32 MiB; give the name of a %s file",
-                           path, what);
+    if (fstat(fileno(f), &is) != 0 || !S_ISREG(is.st_mode) || is.st_size > most)
+        return message_set(why, "%s: not a regular file, or larger than %d MiB; give the name of a %s file",
+                           path, most >> 20, what);
     size_t const size = (size_t)is.st_size;
     out->data = aligned_memory(size + 1, path, why);
     if (!out->data)
@@ -113,7 +111,7 @@ static bool read_stream(FILE *f, const char *path, const char *what, file_bytes 
     return message_set(why, "%s: cannot be read completely", path);
 }
 
-bool file_read(const char *path, const char *what, file_bytes *out, message *why)
+bool file_read(const char *path, const char *what, file_most most, file_bytes *out, message *why)
 {
     *out = (file_bytes){0};
     int const file = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC); /* a pipe would wait for its writer */
@@ -124,7 +122,7 @@ bool file_read(const char *path, const char *what, file_bytes *out, message *why
             close(file);
         return false;
     }
-    bool const ok = read_stream(f, path, what, out, why);
+    bool const ok = read_stream(f, path, what, most, out, why);
     fclose(f);
     return ok;
 }
@@ -135,7 +133,7 @@ bool model_file_open(model_file *m, const char *path, message *why)
     gait_error err = {.text = ""};
     size_t bytes = 0;
     *m = (model_file){0};
-    if (!file_read(path, "model", &m->blob, why))
+    if (!file_read(path, "model", FILE_MOST, &m->blob, why))
         return false;
     gait_result status = gait_model_bytes(m->blob.data, m->blob.size, &bytes, &err);
     if (status == GAIT_OK) {

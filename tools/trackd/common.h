@@ -34,8 +34,12 @@ typedef struct file_bytes {
     size_t size;         /* without that NUL */
 } file_bytes;
 
+/* Most bytes of a file, far more than a model, a camera or an image has, and than eight people of many particles: a wrong
+ * file must not fill the memory. */
+typedef enum { FILE_MOST = 1 << 25, SNAPSHOT_MOST = 1 << 28 } file_most;
+
 /* `what` names the kind of file in the message: "model". */
-bool file_read(const char *path, const char *what, file_bytes *out, message *why);
+bool file_read(const char *path, const char *what, file_most most, file_bytes *out, message *why);
 
 /* ---- a model read from its file, in memory that is allocated once. */
 typedef struct model_file {

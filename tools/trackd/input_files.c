@@ -48,7 +48,7 @@ static bool parse_pnm(const char *path, const file_bytes *bytes, gait_image *out
 
 bool pnm_read(const char *path, file_bytes *bytes, gait_image *out, message *why)
 {
-    if (!file_read(path, "background", bytes, why))
+    if (!file_read(path, "background", FILE_MOST, bytes, why))
         return false;
     if (bytes->size > 2 && parse_pnm(path, bytes, out, why))
         return true;

@@ -233,7 +233,7 @@ bool fields_open(fields *f, const char *path, const char *what, message *why)
     message bad;
     f->path = path;
     f->doc = (json_doc){0};
-    if (!file_read(path, what, &f->bytes, why))
+    if (!file_read(path, what, FILE_MOST, &f->bytes, why))
         return false;
     const char *const text = (const char *)f->bytes.data;
     if (strlen(text) != f->bytes.size)

@@ -204,7 +204,7 @@ bool options_file(const option *table, int count, const char *path, message *why
     message bad;
     bool ok = true;
     options_source file = {.path = path};
-    if (!file_read(path, "configuration", &bytes, why))
+    if (!file_read(path, "configuration", FILE_MOST, &bytes, why))
         return false;
     if (!is_text(&bytes)) {
         free(bytes.data);

@@ -382,7 +382,7 @@ void snapshot_file_resume(snapshot_file *f, service *s)
     f->due = clock_monotonic() + f->period; /* do not delay the first frame */
     if (access(f->path, F_OK) != 0)
         return;
-    if (!file_read(f->path, "snapshot", &file, &why)) {
+    if (!file_read(f->path, "snapshot", SNAPSHOT_MOST, &file, &why)) {
         log_line("%s", why.text);
         return;
     }
