@@ -50,7 +50,7 @@ int main(int argc, char **argv)
     gait_model *model = NULL;
     gait_error err = {.text = ""};
     size_t bytes = 0;
-    if (argc != 3 || !file_read(argv[1], "model", &blob, &why)) {
+    if (argc != 3 || !file_read(argv[1], "model", FILE_MOST, &blob, &why)) {
         fprintf(stderr, "usage: instructions MODEL PARTICLES %s\n", why.text);
         return 2;
     }
