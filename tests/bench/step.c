@@ -267,7 +267,7 @@ static bool bench_model(const settings *set, message *why)
     gait_error err = {.text = ""};
     gait_model *model = NULL;
     size_t bytes = 0;
-    if (!file_read(set->model, "model", &blob, why))
+    if (!file_read(set->model, "model", FILE_MOST, &blob, why))
         return false;
     bool ok = gait_model_bytes(blob.data, blob.size, &bytes, &err) == GAIT_OK;
     void *const memory = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN) / GAIT_ALIGN * GAIT_ALIGN);
