@@ -38,6 +38,7 @@ PHASE_FIELD, HEADING_FIELD = 0, 3  # columns of a table, which are the numbers o
 
 _PAIRS = 1000  # particles with successors, per frame
 _KERNEL_WIDTH = 1.5  # of the kernel, standard deviations of the successors
+_FEWEST = 4  # pairs for each number that varies, from which its regression is taken
 _GROUP = (0.25, 0.8)  # strides and radians within which motions and particles belong together
 _SAME_HYPOTHESIS = (0.15, 0.5)  # strides and radians around a hypothesis, as in estimate.c
 _SIZE_SD = 0.01  # relative sd of the size that pictures determine at best, as in estimate.c
@@ -195,10 +196,12 @@ def _before(
         varying &= continuing
     columns = int(varying.sum())
     close = _near(after, s[0], by_phase=continuing is None or bool(continuing[PHASE_FIELD]))
-    if close.sum() > 4 * columns:
+    if close.sum() > _FEWEST * columns:
         before, after = before[close], after[close]
     # relative to one of the states, since phase and heading are angles
     gain, scatter = _regression(_difference(before, s[0])[:, varying], _difference(after, s[0])[:, varying])
+    if len(after) <= _FEWEST * columns:  # of a rare class: the regression would extrapolate
+        gain = np.eye(columns)
     root = np.linalg.cholesky(scatter)
     gap = _difference(s[:, None], after)[..., varying]  # (M, N, columns)
     distance = np.sum(np.linalg.solve(root, gap.reshape(len(s) * len(after), columns).T) ** 2, axis=0)
