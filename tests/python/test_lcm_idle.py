@@ -73,6 +73,10 @@ def test_a_camera_that_cannot_be_is_refused_in_log_and_status():
     with rig.daemon(private_url()) as (listener, finish):
         stream = [("GAIT_CAMERA_0", nowhere), *rig.frames(0, 1)]
         listener.ask(stream, lambda s: s.state == s.WAITING and s.text.startswith(fault), "the refusal")
+        other = camera_message(rig.CAMERA, 1)
+        other.fx = 0.0  # refused after the frame before it has been answered
+        stream = [*rig.frames(1, 2), ("GAIT_CAMERA_0", other)]
+        listener.ask(stream, lambda s: s.text.startswith("camera with focal lengths"), "the other refusal")
         words = finish().words
     assert words.count(f"gait-trackd: {fault}") == 1
     assert f"frames arrive, but no usable camera: {fault}" in words
