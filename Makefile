@@ -62,6 +62,9 @@ CODE_FLAGS   += $(if $(filter fuzz,$(config)),-fno-sanitize-coverage=trace-cmp)
 # libFuzzer's counters in these loops would take three quarters of the time.
 LESS_WATCHED := -fno-sanitize=undefined,fuzzer-no-link -fsanitize=float-cast-overflow
 WATCHED = $(if $(filter fuzz,$(config)),$(if $(filter scalar,$(1)),,$(LESS_WATCHED)))$(if $(filter coverage,$(config)),-O1)
+# The same in loops over all bytes of a model, and of the record of comparisons in those over a histogram.
+$(B)/src/base/hash.c.o: private CFLAGS += $(if $(filter fuzz,$(config)),$(LESS_WATCHED))
+$(B)/tools/trackd/timing.c.o: private CFLAGS += $(if $(filter fuzz,$(config)),-fno-sanitize-coverage=trace-cmp)
 CXX_FLAGS    += $(if $(filter fuzz,$(config)),-fno-sanitize=function) # needs the C++ runtime
 # As slow as under a sanitizer, so that tests use their shorter films; kernels, in which most time is spent, have -O1.
 OPT_coverage := -O0 --coverage -fprofile-abs-path -DSANITIZED=1

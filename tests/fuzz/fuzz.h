@@ -107,8 +107,9 @@ static inline void fuzz_settings(const char *of, void *at, fuzz_bytes *b)
     enum { MOST = 512 };
     static gait_field fields[MOST]; /* the library walks through its tables each time it is asked for one */
     static uint32_t count;
-    while (count < MOST && gait_field_at(count, &fields[count]) == GAIT_OK)
-        count++;
+    if (count == 0)
+        while (count < MOST && gait_field_at(count, &fields[count]) == GAIT_OK)
+            count++;
     for (uint8_t left = fuzz_take(b) % 4; left > 0; left--) {
         uint8_t chosen = fuzz_take(b);
         float const value = fuzz_number(b);

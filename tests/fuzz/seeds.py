@@ -135,7 +135,7 @@ def main() -> int:
     init = {"frame": 3, "pelvis": [0, 0, 0.9], "phase": 0.5, "sd": {"pelvis": [0.1, 0.2, 0.3]}}
     settings = "model = 'walk.gait' # of the shop\nseed = 5\n\nphase-noise=0.2\nlift = yes\n"
     seeds = {
-        "model": [bytes([choice]) + bytes(8) for choice in range(6)],
+        "model": [bytes([choice]) for choice in range(6)],
         "snapshot": [bytes([kind]) for kind in range(3)],
         "frame": [random.integers(9, 255, 900, np.uint8).tobytes() for _ in range(4)],
         "lift": [random.integers(9, 200, 300, np.uint8).tobytes() for _ in range(4)],
