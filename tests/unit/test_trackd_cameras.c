@@ -53,6 +53,127 @@ static void test_provisional(void)
     CHECK(camera_announced(&slot, &CAMERA, 3) == CAMERA_REFUSED);
 }
 
+/* An older time of arrival, of a log that is damaged, begins the ten seconds anew. */
+static void test_arrival(void)
+{
+    gait_camera const other = wider(60);
+    camera_slot slot = {0};
+    CHECK(camera_announced(&slot, &CAMERA, CAMERA_SILENT) == CAMERA_NEW);
+    CHECK(camera_announced(&slot, &other, CAMERA_SILENT) == CAMERA_REFUSED);
+    CHECK(camera_announced(&slot, &other, 7) == CAMERA_REFUSED && slot.other_since == 7);
+    CHECK(camera_announced(&slot, &other, 6 + CAMERA_SILENT) == CAMERA_REFUSED);
+    CHECK(camera_announced(&slot, &other, 7 + CAMERA_SILENT) == CAMERA_NEW);
+}
+
+/* ---- what a camera has to be ---- */
+static void test_check(void)
+{
+    static const struct {
+        int32_t width, height;
+        float fx, fy;
+        const char *reason;
+    } bad[] = {
+        {0, 32, 50, 50, "size of 0x32"},
+        {48, 0, 50, 50, "size of 48x0"},
+        {GAIT_MAX_PIXELS + 1, 32, 50, 50, "send 1 to"},
+        {48, GAIT_MAX_PIXELS + 1, 50, 50, "send 1 to"},
+        {48, 33, 50, 50, "more than the 1536 that --max-pixels leaves"},
+        {48, 32, 0, 50, "focal lengths 0 and 50"},
+        {48, 32, 50, NAN, "focal lengths 50 and nan"},
+    };
+    message why;
+    gait_camera c = CAMERA, out;
+    CHECK(camera_check(&c, 48 * 32, &why));
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        c = CAMERA;
+        c.width = bad[i].width, c.height = bad[i].height, c.fx = bad[i].fx, c.fy = bad[i].fy;
+        CHECK(!camera_check(&c, 48 * 32, &why) && strstr(why.text, bad[i].reason));
+    }
+    for (int i = 0; i < 9; i++) { /* another number anywhere, or a left-handed system */
+        c = CAMERA;
+        c.R[i] = c.R[i] == 0.0f ? 0.1f : -c.R[i];
+        CHECK(!camera_check(&c, 48 * 32, &why) && strstr(why.text, "R is not a rotation"));
+        gaitmsg_camera_t const msg = {.width = 48, .height = 32, .fx = 50, .fy = 50, .R = {1, 2}};
+        CHECK(!camera_from_message(&msg, 48 * 32, &out, &why) && strstr(why.text, "R is not a rotation"));
+    }
+}
+
+static void test_same(void)
+{
+    gait_camera c = CAMERA;
+    CHECK(camera_same(&c, &CAMERA));
+    c.t[2] *= 1.000001f; /* rounding */
+    CHECK(camera_same(&c, &CAMERA));
+    c = CAMERA;
+    c.distortion[4] = 1e-3f;
+    CHECK(!camera_same(&c, &CAMERA));
+    c = CAMERA;
+    c.width++;
+    CHECK(!camera_same(&c, &CAMERA));
+    c = CAMERA;
+    c.height++;
+    CHECK(!camera_same(&c, &CAMERA));
+}
+
+/* ---- files ---- */
+#define BEGIN  "{\"width\": 48, \"height\": 32, \"fx\": 50, \"fy\": 50, \"cx\": 24, \"cy\": 16, "
+#define TURNED "\"R\": [1, 0, 0, 0, 0, -1, 0, 1, 0], "
+
+static bool file(const char *text, gait_camera *out, message *why)
+{
+    char name[] = P_tmpdir "/gait_cameras_XXXXXX";
+    int const made = mkstemp(name);
+    if (made < 0 || write(made, text, strlen(text)) != (ssize_t)strlen(text))
+        abort();
+    close(made);
+    bool const ok = camera_file_read(name, out, why);
+    CHECK(ok || strncmp(why->text, name, strlen(name)) == 0);
+    unlink(name);
+    return ok;
+}
+
+static void test_files(void)
+{
+    static const char *const good[] = {
+        BEGIN TURNED "\"t\": [0, 1, 5]}",
+        BEGIN TURNED "\"t\": [0, 1, 5], \"distortion\": [], \"note\": {\"any\": [1]}}",
+        BEGIN TURNED "\"t\": [0, 1, 5], \"distortion\": [0, 0, 0, 0]}",
+        BEGIN "\"R\": [[1, 0, 0], [0, 0, -1], [0, 1, 0]], \"t\": [0, 1, 5], \"distortion\": [0, 0, 0, 0, 0]}",
+    };
+    static const struct {
+        const char *text, *reason;
+    } bad[] = {
+        {"{\"width\": 4.5}", "width is 4.5, not a whole number"},
+        {"{\"width\": 48}", "height is missing; give the size of the video"},
+        {"{\"width\": 48, \"height\": 32}", "fx is missing; give the focal length"},
+        {"{\"width\": 48, \"height\": 32, \"fx\": 50}", "fy is missing; give the focal length"},
+        {"{\"width\": 48, \"height\": 32, \"fx\": 50, \"fy\": 50}",
+         "cx is missing; give the principal point"},
+        {"{\"width\": 48, \"height\": 32, \"fx\": 50, \"fy\": 50, \"cx\": 2}", "cy is missing"},
+        {BEGIN "\"t\": [0, 1, 5]}", "R is missing; give the rotation"},
+        {BEGIN TURNED "\"t\": [0, 1]}", "t has 2 numbers, not 3"},
+        {BEGIN TURNED "\"t\": [0, 1, 5], \"distortion\": [0, 0]}", "distortion is not such a list"},
+        {BEGIN TURNED "\"t\": [0, 1, 5], \"distortion\": \"no\"}", "distortion is not such a list"},
+        {BEGIN TURNED "\"t\": [0, 1, 5], \"distortion\": [0, 0, 0, 1e9]}", "outside [-1000, 1000]"},
+        {BEGIN "\"R\": [1, 0, 0, 0, 1, 0, 0, 0, -1], \"t\": [0, 1, 5]}", "R is not a rotation"},
+        {BEGIN TURNED "\"t\": [0, -1, 5]}", ": "}, /* below the ground */
+        {BEGIN TURNED "\"t\": [0, 1, NaN]}", "t is not finite"},
+        {BEGIN TURNED "\"t\": [0, 1, 5], \"focus\": 1}", "focus is not a known key"},
+        {BEGIN TURNED "\"t\": [0, 1, 5], \"t\": [0, 1, 5]}", "t is given twice"},
+        {"[1]", "not a JSON object"},
+        {"{", "not valid JSON (line 1: "},
+    };
+    gait_camera out;
+    message why;
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++)
+        CHECK(file(good[i], &out, &why) && camera_same(&out, &CAMERA));
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        CHECK(!file(bad[i].text, &out, &why) && strstr(why.text, bad[i].reason));
+    CHECK(!camera_file_read("shop.toml:door", &out, &why) && strstr(why.text, "reads JSON only"));
+    CHECK(!camera_file_read("folder/cams.pkl", &out, &why) && strstr(why.text, "reads JSON only"));
+    CHECK(!camera_file_read("absent.toml/camera", &out, &why) && strstr(why.text, "cannot open"));
+}
+
 /* ---- a service with a further camera ---- */
 static service s;
 static further more;
@@ -121,6 +242,10 @@ int main(void)
 {
     test_slot();
     test_provisional();
+    test_arrival();
+    test_check();
+    test_same();
+    test_files();
     start();
     test_further();
     service_close(&s);

@@ -14,20 +14,37 @@ static bool parse(const char *text)
 
 static void test_accepts_what_json_is(void)
 {
-    static const char *const good[] = {"0",           "-0.5e+3",        "[]",   "{}",
-                                       " [ 1 , 2 ] ", "\"\\u00e9\\n\"", "null", "true",
-                                       "[[[1]]]",     "{\"a\":{}}\n",   "1E5",  "[\"\", false]",
-                                       "NaN",         "-Infinity"}; /* the last two are refused by key */
+    static const char *const good[] = {"0",
+                                       "-0.5e+3",
+                                       "[]",
+                                       "{}",
+                                       " [ 1 , 2 ] ",
+                                       "\"\\u00e9\\n\"",
+                                       "null",
+                                       "true",
+                                       "[[[1]]]",
+                                       "{\"a\":{}}\n",
+                                       "1E5",
+                                       "[\"\", false]",
+                                       "NaN",
+                                       "-Infinity",
+                                       "\t[\r\n1\t]\r",
+                                       "1e-5",
+                                       "1.5e+5",
+                                       "\"\\uABEF\\u09af\\/\\\\\""}; /* NaN and Infinity are refused by key */
     for (size_t i = 0; i < sizeof good / sizeof *good; i++)
         CHECK(parse(good[i]));
 }
 
 static void test_refuses_what_it_is_not(void)
 {
-    static const char *const bad[] = {"",     " ",        "01",         "1.",   ".5",   "+1",     "1e",
-                                      "[1,]", "[1 2]",    "{1:2}",      "nul",  "\"a",  "\"\t\"", "{\"a\"}",
-                                      "[",    "]",        "1 1",        "0x10", "NaNs", "1e400",  "\"\\u12\"",
-                                      "'a'",  "{\"a\":}", "{\"a\":1,}", "--1",  "-"};
+    static const char *const bad[] = {
+        "",          " ",           "01",          "1.",          ".5",          "+1",          "1e",
+        "[1,]",      "[1 2]",       "{1:2}",       "nul",         "\"a",         "\"\t\"",      "{\"a\"}",
+        "[",         "]",           "1 1",         "0x10",        "NaNs",        "1e400",       "\"\\u12\"",
+        "'a'",       "{\"a\":}",    "{\"a\":1,}",  "--1",         "-",           "1e+",         "\"\\",
+        "\"\\x\"",   "\"\\uG000\"", "\"\\u0g00\"", "\"\\u00:0\"", "\"\\u000@\"", "\"\\u000`\"", "\"\\u/000\"",
+        "{\"a\" 1}", "[1}",         "{\"a\":1]"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         why.text[0] = '\0';
         CHECK(!parse(bad[i]));
@@ -62,6 +79,16 @@ static void test_values_by_key(void)
     CHECK(json_numbers(&doc, json_find(&doc, json_find(&doc, 0, "x"), "a"), v, 4) == 1 && v[0] == 1);
 }
 
+/* Whatever kind of value has no space. */
+static void test_space(void)
+{
+    static const char kinds[] = "{\"a\": [1, true, \"x\", {}, []]}";
+    int const all = 8; /* values and keys */
+    for (int cap = 0; cap < all; cap++)
+        CHECK(!json_parse(&doc, nodes, cap, kinds, &why) && strstr(why.text, "more values"));
+    CHECK(json_parse(&doc, nodes, all, kinds, &why) && doc.used == all);
+}
+
 static void test_limits(void)
 {
     char text[200] = "[";
@@ -81,6 +108,7 @@ int main(void)
     test_refuses_what_it_is_not();
     test_every_prefix_is_refused();
     test_values_by_key();
+    test_space();
     test_limits();
     return CHECK_DONE();
 }

@@ -157,14 +157,14 @@ lcm_t *link_open(const char *url, message *why)
     mute();
     lcm_t *const lcm = lcm_create(url);
     unmute();
-    if (!lcm && link_is_log(url) && link_log(url, path) == 'r')
+    if (!lcm && link_is_log(url))
         message_set(why, "%.160s: liblcm cannot read this log", path);
     else if (!lcm && not_multicast(url, address))
         message_set(why, "%.100s: %s is not a multicast address; give one from 224.0.0.0 to 239.255.255.255",
                     url, address);
-    else if (!lcm && !link_is_log(url) && strstr(url, "udpm://")) /* or mpudpm:// */
+    else if (!lcm && strstr(url, "udpm://")) /* or mpudpm:// */
         message_set(why, "%.120s: cannot open LCM; " ROUTE_REMEDY, url);
-    else if (!lcm && !link_is_log(url))
+    else if (!lcm)
         message_set(
             why,
             "%.120s: cannot open LCM; give udpm://ADDRESS:PORT or file:///PATH?speed=0 (?mode=w to write)",

@@ -1,0 +1,259 @@
+/* Connections and outputs: which URL is meant, the remedy when LCM cannot be opened, and outputs that fail. */
+#define _XOPEN_SOURCE 700 /* setenv */
+#include <errno.h>
+#include <fcntl.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "../../tools/trackd/lcm_link.h"
+
+/* The layer under lcm_link.c: LCM without a network, and files that fail. */
+static struct layer {
+    bool no_lcm, no_subscription, no_dup, no_null; /* which call fails */
+    int publish, fsync;                            /* result; errno */
+    int subscribed, destroyed, capacity;           /* number of calls; last capacity */
+} layer;
+
+static lcm_t *const LCM = (lcm_t *)&layer; /* is only handed on */
+static lcm_subscription_t *const SUBSCRIPTION = (lcm_subscription_t *)&layer;
+
+static lcm_t *layer_create(const char *url)
+{
+    fputs("pages about a missing route\n", stderr);
+    return layer.no_lcm || !*url ? NULL : LCM;
+}
+
+static int layer_publish(lcm_t *lcm, const char *channel, const void *data, unsigned size)
+{
+    return lcm == LCM && *channel && data && size ? layer.publish : 0;
+}
+
+static lcm_subscription_t *layer_subscribe(lcm_t *lcm, const char *channel, lcm_msg_handler_t fn, void *user)
+{
+    layer.subscribed += lcm == LCM && *channel && fn && user;
+    return layer.no_subscription ? NULL : SUBSCRIPTION;
+}
+
+static int layer_capacity(lcm_subscription_t *s, int capacity)
+{
+    layer.capacity = s == SUBSCRIPTION ? capacity : -1;
+    return 0;
+}
+
+static void layer_destroy(lcm_t *lcm)
+{
+    layer.destroyed += lcm == LCM;
+}
+
+static int layer_dup(int file)
+{
+    return layer.no_dup ? -1 : dup(file);
+}
+
+static int layer_open(const char *path, int flags)
+{
+    return layer.no_null ? -1 : open(path, flags);
+}
+
+static int layer_fsync(int file)
+{
+    errno = layer.fsync;
+    return layer.fsync ? -1 : fsync(file);
+}
+
+#undef lcm_create
+#undef lcm_publish
+#undef lcm_subscribe
+#undef lcm_subscription_set_queue_capacity
+#undef lcm_destroy
+#define lcm_create                          layer_create
+#define lcm_publish                         layer_publish
+#define lcm_subscribe                       layer_subscribe
+#define lcm_subscription_set_queue_capacity layer_capacity
+#define lcm_destroy                         layer_destroy
+#define dup                                 layer_dup
+#define open                                layer_open
+#define fsync                               layer_fsync
+#include "../../tools/trackd/lcm_link.c"
+#undef dup
+#undef open
+#undef fsync
+
+#include "check.h"
+
+static message why;
+
+static void test_url(void)
+{
+    CHECK(unsetenv("LCM_DEFAULT_URL") == 0 && strcmp(link_url(""), LINK_DEFAULT_URL) == 0);
+    CHECK(strcmp(link_url("udpm://a"), "udpm://a") == 0 && strcmp(link_url(NULL), LINK_DEFAULT_URL) == 0);
+    CHECK(setenv("LCM_DEFAULT_URL", "", 1) == 0 && strcmp(link_url(""), LINK_DEFAULT_URL) == 0);
+    CHECK(setenv("LCM_DEFAULT_URL", "udpm://b", 1) == 0 && strcmp(link_url(""), "udpm://b") == 0);
+    CHECK(strcmp(link_url("udpm://a"), "udpm://a") == 0);
+}
+
+static void test_log_names(void)
+{
+    static const struct {
+        const char *url, *path;
+        char mode;
+    } logs[] = {
+        {"file:///a/b", "/a/b", 'r'},
+        {"file:///a?speed=0", "/a", 'r'},
+        {"file:///a?mode=w", "/a", 'w'},
+        {"file:///a?mode=a&speed=0", "/a", 'a'},
+        {"file:///a?speed=0&mode=w", "/a", 'w'},
+        {"file:///a?mode=", "/a", 0},
+        {"file:///a?mode=x", "/a", 0},
+        {"file:///a?mode=ww", "/a", 0},
+        {"/a", "/a", 'r'},
+    };
+    char path[LINK_PATH];
+    for (size_t i = 0; i < sizeof logs / sizeof *logs; i++)
+        CHECK(link_log(logs[i].url, path) == logs[i].mode && strcmp(path, logs[i].path) == 0);
+}
+
+static bool refused(const char *url, const char *reason)
+{
+    why.text[0] = '\0';
+    return !link_open(url, &why) && strstr(why.text, reason);
+}
+
+static void test_open(void)
+{
+    layer = (struct layer){0};
+    CHECK(link_open("udpm://239.1.1.1:7667", &why) == LCM);
+    layer.no_lcm = true;
+    CHECK(refused("udpm://239.1.1.1:7667?ttl=0", "ip route add"));
+    CHECK(refused("mpudpm://239.1.1.1:7667", "ip route add"));
+    CHECK(refused("udpm://", "ip route add"));
+    CHECK(refused("udpm://a.name.longer.than.an.address:7667", "ip route add"));
+    CHECK(refused("udpm://10.0.0.7:7667", "10.0.0.7 is not a multicast address"));
+    CHECK(refused("other://", "give udpm://ADDRESS:PORT"));
+    CHECK(refused("file:///absent?speed=0", "/absent: cannot open this log"));
+    CHECK(refused("file:///absent?mode=w", "/absent: liblcm cannot read this log"));
+}
+
+/* What LCM prints while it connects is not seen, also if that takes a file too many; what follows is. */
+static void test_muted(void)
+{
+    char name[] = P_tmpdir "/gait_link_XXXXXX", text[256];
+    int const file = mkstemp(name), own = dup(STDERR_FILENO);
+    for (int fault = 0; fault < 3; fault++) {
+        layer = (struct layer){.no_lcm = true, .no_dup = fault == 1, .no_null = fault == 2};
+        fflush(stderr);
+        dup2(file, STDERR_FILENO);
+        CHECK(refused("other://", "cannot open LCM"));
+        fputs("seen\n", stderr);
+        fflush(stderr);
+        dup2(own, STDERR_FILENO);
+        lseek(file, 0, SEEK_SET);
+        ssize_t const n = read(file, text, sizeof text - 1);
+        text[n < 0 ? 0 : n] = '\0';
+        CHECK(strcmp(text, fault ? "pages about a missing route\nseen\n" : "seen\n") == 0);
+        CHECK(ftruncate(file, 0) == 0 && lseek(file, 0, SEEK_SET) == 0);
+    }
+    close(file);
+    close(own);
+    unlink(name);
+}
+
+static void none(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    (void)buf, (void)channel, (void)user;
+}
+
+static void test_subscribe(void)
+{
+    layer = (struct layer){0};
+    CHECK(link_subscribe(LCM, "GAIT_IMAGE_0", none, &layer, 7, &why) == SUBSCRIPTION);
+    CHECK(layer.subscribed == 1 && layer.capacity == 7);
+    layer.no_subscription = true;
+    CHECK(!link_subscribe(LCM, "GAIT_IMAGE_0", none, &layer, 7, &why));
+    CHECK(strstr(why.text, "cannot receive GAIT_IMAGE_0; ") != NULL);
+}
+
+/* ---- output ---- */
+static const uint8_t data[4096];
+
+/* Losses are counted; the first is reported, and again at the end. */
+static void test_lost_messages(void)
+{
+    sink s;
+    layer = (struct layer){0};
+    CHECK(sink_open(&s, "udpm://239.1.1.1:7667", &why));
+    sink_publish(&s, "A", 0, data, 0);
+    sink_publish(&s, "A", 2, data, 9);
+    CHECK(s.failed == 0);
+    layer.publish = -1;
+    sink_publish(&s, "A", 0, data, 9);
+    sink_publish(&s, "A", 0, data, 9);
+    CHECK(s.failed == 2 && !sink_ended(&s, &why)); /* later ones may go out */
+    CHECK(!sink_close(&s, &why) &&
+          strcmp(why.text, "--out: messages were lost: LCM could not send them") == 0);
+    CHECK(layer.destroyed == 1 && !s.lcm);
+    layer.publish = 0;
+    CHECK(sink_open(&s, "udpm://239.1.1.1:7667", &why) && sink_close(&s, &why) && layer.destroyed == 2);
+}
+
+static void test_log(void)
+{
+    char name[] = P_tmpdir "/gait_link_XXXXXX", url[64];
+    sink s = {0};
+    close(mkstemp(name));
+    snprintf(url, sizeof url, "file://%s?mode=w", name);
+    layer = (struct layer){0};
+    CHECK(!sink_open(&s, "file:///absent/log?mode=w", &why) && strstr(why.text, "No such file"));
+    CHECK(sink_close(&s, &why)); /* no output */
+    CHECK(sink_open(&s, url, &why));
+    sink_publish(&s, "A", 0, data, 9);
+    CHECK(!sink_ended(&s, &why) && sink_close(&s, &why) && log_scan(name, &why) == 1);
+    static const struct {
+        int fault;
+        bool fine;
+    } fsyncs[] = {{EINVAL, true}, {EROFS, true}, {EIO, false}};
+    for (size_t i = 0; i < sizeof fsyncs / sizeof *fsyncs; i++) {
+        layer.fsync = fsyncs[i].fault;
+        CHECK(sink_open(&s, url, &why));
+        CHECK(sink_close(&s, &why) == fsyncs[i].fine && (fsyncs[i].fine || strstr(why.text, strerror(EIO))));
+    }
+    unlink(name);
+}
+
+/* A full disk is noticed when a buffer is written, or at the end; after it nothing more is written. */
+static void test_full_disk(void)
+{
+    sink s;
+    layer = (struct layer){0};
+    CHECK(sink_open(&s, "file:///dev/full?mode=w", &why));
+    sink_publish(&s, "A", 0, data, 9); /* is buffered */
+    CHECK(!sink_ended(&s, &why) && !sink_close(&s, &why) && strstr(why.text, strerror(ENOSPC)));
+    CHECK(sink_open(&s, "file:///dev/full?mode=w", &why));
+    for (int i = 0; i < 3; i++)
+        sink_publish(&s, "A", 0, data, sizeof data);
+    CHECK(sink_ended(&s, &why) && strstr(why.text, strerror(ENOSPC)));
+    int64_t const failed = s.failed;
+    sink_publish(&s, "A", 0, data, 9);
+    CHECK(s.failed == failed + 1);
+    CHECK(!sink_close(&s, &why) && strstr(why.text, "the log cannot be written: "));
+    CHECK(sink_open(&s, "file:///dev/full?mode=w", &why));
+    sink_publish(&s, "A", 0, data, 9);
+    CHECK(fflush(s.log->f) != 0);
+    sink_publish(&s, "A", 0, data, 9); /* is buffered, but those before it are lost */
+    CHECK(sink_ended(&s, &why) && !sink_close(&s, &why));
+}
+
+int main(void)
+{
+    test_url();
+    test_log_names();
+    test_open();
+    test_muted();
+    test_subscribe();
+    test_lost_messages();
+    test_log();
+    test_full_disk();
+    return CHECK_DONE();
+}
