@@ -168,6 +168,7 @@ static void spoil(gait_tracker *t, void *field, const void *bad, size_t size)
             spoil(t, &(field), &bad[b], sizeof bad[b]);                                                      \
     } while (0)
 #define NOT_FINITE NAN, INFINITY, -INFINITY
+#define TOO_LARGE  NOT_FINITE, 1.1e6f, -3.4e38f
 
 /* Every number of the state in turn; of times and counts also those whose differences would overflow. */
 static void test_implausible(gait_tracker *t)
@@ -195,8 +196,8 @@ static void test_implausible(gait_tracker *t)
     SPOIL(c->front_back_margin, float, NOT_FINITE);
     SPOIL(c->left_right_margin, float, NOT_FINITE);
     SPOIL(c->map[0].scale, float, NAN, -1.0f, 3.0f);
-    SPOIL(c->map[0].u0, float, NOT_FINITE);
-    SPOIL(c->map[0].v0, float, NOT_FINITE);
+    SPOIL(c->map[0].u0, float, TOO_LARGE);
+    SPOIL(c->map[0].v0, float, TOO_LARGE);
     SPOIL(t->filter.weight[3], double, NAN, -1.0, 0.9, 2.0);
     SPOIL(t->filter.log_weight[3], double, NAN, 2.0, -3e300);
     SPOIL(t->filter.parent[3], int32_t, -1, t->capacity);
@@ -206,7 +207,7 @@ static void test_implausible(gait_tracker *t)
     SPOIL(record->status, int32_t, -1, 77);
     SPOIL(t->history.count[1], int32_t, -1, t->capacity + 1);
     SPOIL(t->history.parent[5], int32_t, -1, t->capacity);
-    SPOIL(t->history.value[5], float, NOT_FINITE);
+    SPOIL(t->history.value[5], float, TOO_LARGE);
     if (t->template[0][0])
         SPOIL(t->template[0][0][7], int16_t, -127 * TEMPLATE_ONE - 1, INT16_MAX);
     if (t->classes) {
@@ -216,7 +217,7 @@ static void test_implausible(gait_tracker *t)
         SPOIL(s->supported, int32_t, -1, TOY_CLASSES);
         SPOIL(s->resampled, int64_t, -1, INT64_MAX);
         SPOIL(s->moved, int64_t, INT64_MIN, INT64_MAX);
-        SPOIL(s->score[1][0], float, NOT_FINITE);
+        SPOIL(s->score[1][0], float, TOO_LARGE);
         SPOIL(of->count, int32_t, 0, MAX_STRATA + 1, 1);
         SPOIL(of->first[0], int32_t, BLOCK);
         SPOIL(of->first[1], int32_t, 0, 1, t->capacity);
@@ -227,7 +228,7 @@ static void test_implausible(gait_tracker *t)
         SPOIL(t->walk_check->age, int64_t, -1, INT64_MAX);
         SPOIL(t->walk_check->cameras, uint32_t, 2);
         SPOIL(t->walk_check->nats, float, NOT_FINITE);
-        SPOIL(t->walk_check->body.f[0], float, NOT_FINITE);
+        SPOIL(t->walk_check->body.f[0], float, TOO_LARGE);
     }
 }
 

@@ -56,6 +56,18 @@ static const unsigned char *in_body(const gait_tracker *t, const unsigned char *
     return body + ((const unsigned char *)array - (const unsigned char *)t->core);
 }
 
+/* More than any number of a state: what a step computes from numbers below it is finite. */
+static const float LARGEST_NUMBER = 1e6f;
+
+/* Whether all n numbers are that small; false for NaN. */
+static bool moderate(const float *x, size_t n)
+{
+    bool ok = true;
+    for (size_t i = 0; i < n; i++)
+        ok &= fabsf(x[i]) <= LARGEST_NUMBER;
+    return ok;
+}
+
 /* Microseconds since the start that no tracker reaches: differences of times below it cannot overflow. */
 static const uint64_t LONGEST_AGE = 1ull << 62;
 
@@ -79,7 +91,7 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
     ok &= f_finite(&c.front_back_margin, 1) && f_finite(&c.left_right_margin, 1);
     for (int32_t k = 0; k < t->cfg.cameras; k++) {
         const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};
-        ok &= f_finite(map, 3) && map[0] >= 0.0f && map[0] <= 2.0f;
+        ok &= moderate(map, 3) && map[0] >= 0.0f && map[0] <= 2.0f;
     }
     return ok;
 }
@@ -139,7 +151,7 @@ static bool history_plausible(const gait_tracker *t, const unsigned char *body)
     for (size_t i = 0; i < generations * values; i++) {
         float v;
         memcpy(&v, in_body(t, body, &h->value[i]), sizeof v);
-        if (!f_finite(&v, 1))
+        if (!moderate(&v, 1))
             return false;
     }
     return true;
@@ -167,7 +179,7 @@ static bool classes_plausible(const gait_tracker *t, const unsigned char *body)
     memcpy(&s, in_body(t, body, t->classes), sizeof s);
     bool ok = (uint32_t)s.reported < classes && (uint32_t)s.supported < classes && s.resampled >= 0 &&
               s.resampled <= c.utime - c.start_utime && s.moved >= 0 && s.moved <= c.utime - c.start_utime &&
-              f_finite(s.score[0], GAIT_MAX_CLASSES * GAIT_MAX_COMPONENTS);
+              moderate(s.score[0], GAIT_MAX_CLASSES * GAIT_MAX_COMPONENTS);
     for (int32_t k = 0; ok && k < h->depth && ((uint64_t)k < c.frame || k == 0); k++) {
         int32_t const slot = history_slot(h, c.generation, k);
         int32_t count;
@@ -200,7 +212,7 @@ static bool walk_check_plausible(const gait_tracker *t, const unsigned char *bod
         return true;
     memcpy(&w, in_body(t, body, t->walk_check), sizeof w);
     return w.age >= 0 && (uint64_t)w.age < LONGEST_AGE && w.cameras >> t->cfg.cameras == 0 &&
-           f_finite(&w.nats, 1) && f_finite(w.body.f, F_MAX);
+           f_finite(&w.nats, 1) && moderate(w.body.f, F_MAX);
 }
 
 gait_result snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gait_error *err)
