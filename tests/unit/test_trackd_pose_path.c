@@ -55,7 +55,7 @@ static void test_still(void)
     CHECK(memcmp(&pose, &path.pose[0].sent, sizeof pose) == 0);
 }
 
-static void test_gaps_and_jumps(void)
+static void test_gaps(void)
 {
     begin();
     CHECK(at(0, 0, 0) && at(POSE_PATH_GAP + 1, 0, 0) && at(POSE_PATH_GAP + 1 + FRAME, 1, 0));
@@ -111,7 +111,7 @@ int main(void)
 {
     test_between();
     test_still();
-    test_gaps_and_jumps();
+    test_gaps();
     test_order();
     test_oldest();
     test_now();
