@@ -173,6 +173,22 @@ def test_after_a_kill_everyone_is_followed_by_number_as_if_nothing_had_happened(
         assert off(person, one) < 0.35
 
 
+def test_a_pause_of_the_stream_is_no_absence(tmp_path):
+    """After one, or after a kill, a frame may come before its keypoints: no one has left."""
+    names, end, pause = list(rig.model().joint_names), 20, 18  # frames
+    log = [("GAIT_CAMERA_0", camera_message(rig.CAMERA, 1)), ("GAIT_BACKGROUND_0", image(BACK - 1))]
+    for frame in range(end):
+        uv = rig.CAMERA.project(joints(2, frame))
+        log.append(("GAIT_TRACKS_0_2", tracks_message(names, uv, time_of(frame), frame)))
+        log.append(("GAIT_IMAGE_0", image(frame)))
+    empty = [k for k in range(end, end + 44) if not end + 7 <= k < end + 7 + pause]
+    nothing = [("GAIT_IMAGE_0", image_message(rig.plate(), time_of(k), k)) for k in empty]
+    for seen, left in ((9, False), (len(nothing), True)):
+        found, printed = played(rig.write_log(tmp_path / "a.log", log + nothing[:seen]), "--people", 2)
+        assert found[2][-1].status == LOST and found[2][-1].frame >= empty[7]
+        assert ("person 2 is out of view" in printed) == left
+
+
 def test_a_person_who_comes_back_has_the_same_number(streams):
     """Away for 8.5 s, during which no person is tracked."""
     for person in (1, 2):

@@ -96,6 +96,8 @@ bool keypoints_view_unknown(message *why)
 }
 
 /* ---- keypoints for the tracker ---- */
+enum { LONGEST_INTERVAL = 250000 }; /* microseconds between two frames that count as time without keypoints */
+
 void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joints, float sd)
 {
     *cue = (keypoint_cue){.model = model, .joints = joints, .sd = sd, .frame_utime = -1};
@@ -105,12 +107,13 @@ void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joint
 
 void keypoint_cue_resume(keypoint_cue *cue, int64_t utime)
 {
-    cue->frame_utime = cue->used_utime = utime;
+    cue->frame_utime = utime;
 }
 
 void keypoint_cue_forget(keypoint_cue *cue)
 {
     cue->frame_utime = -1;
+    cue->unseen = 0;
 }
 
 static int32_t find(const keypoint_cue *cue, const char *name)
@@ -173,8 +176,9 @@ const gait_keypoint *keypoint_cue_at(const keypoint_cue *cue, int64_t utime)
 const gait_keypoint *keypoint_cue_use(keypoint_cue *cue, int64_t utime)
 {
     const gait_keypoint *const found = keypoint_cue_at(cue, utime);
+    int64_t const interval = cue->frame_utime < 0 ? 0 : utime - cue->frame_utime;
+    cue->unseen = found ? 0 : cue->unseen + (interval < LONGEST_INTERVAL ? interval : LONGEST_INTERVAL);
     cue->frame_utime = utime;
     cue->used += found != NULL;
-    cue->used_utime = found ? utime : cue->used_utime;
     return found;
 }

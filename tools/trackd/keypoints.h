@@ -66,12 +66,12 @@ typedef struct keypoint_cue {
     int64_t messages, used,
         late;            /* messages: that arrived; that a frame used; that arrived after their frame */
     int64_t frame_utime; /* of the last tracked frame; -1: none */
-    int64_t used_utime;  /* of the last tracked frame that had keypoints */
+    int64_t unseen;      /* microseconds of frames since the last one that had keypoints */
 } keypoint_cue;
 
 /* `model` must outlive `cue`. */
 void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joints, float sd);
-/* The tracker continues after a frame of this time, as if that had had keypoints. */
+/* The tracker continues after a frame of this time. */
 void keypoint_cue_resume(keypoint_cue *cue, int64_t utime);
 /* Tracking has stopped: accept keypoints of any time again. */
 void keypoint_cue_forget(keypoint_cue *cue);

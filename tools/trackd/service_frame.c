@@ -8,7 +8,7 @@
 
 enum {
     FIT_PERIOD = 100000, /* microseconds between two fits of the automatic start */
-    /* microseconds without keypoints after which one of several people who is lost has left */
+    /* microseconds of frames without keypoints after which one of several people who is lost has left */
     AWAY = 1000000,
     LONGEST_GAP = 1 << 20 /* frames; a number that is further away begins a new count */
 };
@@ -296,7 +296,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     s->steps++;
     histogram_add(&s->counts.latency, clock_wall() - v->utime);
     adapt(s, birth, step_us);
-    if (s->person && estimate.status == GAIT_TRACK_LOST && v->utime - s->cue->used_utime > AWAY)
+    if (s->person && estimate.status == GAIT_TRACK_LOST && s->cue->unseen > AWAY)
         leave(s); /* images alone would find another person */
     else if (estimate.status == GAIT_TRACK_LOST && frame.image[0].data)
         try_auto_start(s, v, &frame.image[0]);
