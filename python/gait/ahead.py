@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -18,11 +18,15 @@ class _End:
         self.reason = reason
 
 
-def ahead(source: Iterable[T], limit: int = 4) -> Generator[T, None, None]:
+def ahead(
+    source: Iterable[T], limit: int = 4, stop: Callable[[], None] = lambda: None
+) -> Generator[T, None, None]:
     """Yield the items of `source`, which another thread reads up to `limit` items ahead.
 
     Frames are then decoded while earlier ones are tracked, and tracked while earlier ones are drawn and
     written.  An exception of the source is raised here, after the items before it.
+
+    The end waits for the item that is being read; `stop` is called first, for a source that may wait long.
     """
     waiting: queue.Queue[T | _End] = queue.Queue(limit)
     left = threading.Event()
@@ -55,4 +59,5 @@ def ahead(source: Iterable[T], limit: int = 4) -> Generator[T, None, None]:
             raise item.reason
     finally:
         left.set()
+        stop()
         thread.join()

@@ -1,6 +1,11 @@
-"""gait capture of a stream: a local server breaks off, refuses, and returns; frames continue."""
+"""gait capture of a stream: a local server breaks off, refuses, hangs, and returns; frames continue.
+
+Over HTTP and over RTSP.
+"""
 
 import io
+import signal
+import subprocess
 import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -13,8 +18,12 @@ import pytest
 av = pytest.importorskip("av", reason="PyAV is not installed: extra video")
 pytest.importorskip("lcm", reason="lcm is not installed: extra lcm")
 
+import lcm_rig as rig  # noqa: E402
+from rtsp_camera import Answer, RtspCamera  # noqa: E402
+
 from gait.errors import UserError  # noqa: E402
 from gait.lcm import streams  # noqa: E402
+from gait.lcm.link import gaitmsg  # noqa: E402
 from gait.lcm.streams import StreamSource, is_stream  # noqa: E402
 
 
@@ -135,6 +144,62 @@ def test_another_size_ends_it(camera):
     with pytest.raises(UserError, match="came back with 96x64 pixels instead of 160x120"):
         for _ in source.frames():
             pass
+
+
+@pytest.fixture
+def rtsp():
+    camera = RtspCamera()
+    yield camera
+    camera.close()
+
+
+def test_frames_of_an_rtsp_camera_go_on_after_every_fault(rtsp, capsys):
+    faults = [Answer(status=503), Answer(status=404), Answer(frames=0)]
+    hung = [Answer(hangs=method) for method in ("OPTIONS", "DESCRIBE", "SETUP")]
+    rtsp.answers = [Answer(), *faults, *hung, Answer(frames=0, hangs="PLAY"), Answer(hangs="PLAY"), Answer()]
+    source = StreamSource(rtsp.url, grey=True)
+    source._limit = streams._OPEN  # also on a busy machine
+    frames, found = source.frames(), []
+    while rtsp.connections < 10:
+        found.append(next(frames))
+    assert [frame.number for frame in found] == list(range(len(found)))
+    assert all(np.diff([frame.time for frame in found]) >= 0)
+    levels = [round(float(frame.image.mean())) for frame in found]
+    begun = [k for k in range(1, len(found)) if levels[k] < levels[k - 1]]
+    assert len(begun) == 2 and begun[1] - begun[0] >= 39  # only the last frame of a connection may be lost
+    printed = capsys.readouterr().err
+    assert printed.count("connection lost; reconnecting") == 2 and "secret" not in printed
+
+
+def test_an_rtsp_camera_of_another_size_ends_it(rtsp):
+    rtsp.answers = [Answer(), Answer(size=(96, 64))]
+    with pytest.raises(UserError, match="came back with 96x64 pixels instead of 160x120"):
+        for _ in StreamSource(rtsp.url, quiet=True).frames():
+            pass
+
+
+def test_the_command_records_an_rtsp_camera_that_broke_off(rtsp, tmp_path):
+    rtsp.answers = [Answer(), Answer()]
+    log = tmp_path / "a.log"
+    words = [rig.PYTHON, "-m", "gait", "capture", rtsp.url, "--grey", "--url", f"file://{log}?mode=w"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as command:
+        try:
+            assert rtsp.refused.wait(rig.PATIENCE)  # both streams have been read
+            command.send_signal(signal.SIGINT)
+            printed, words = command.communicate(timeout=rig.PATIENCE)
+        finally:
+            command.kill()
+    assert command.returncode == 0, words
+    images = rig.read_log(log, "GAIT_IMAGE_0", gaitmsg.image_t)
+    assert 60 <= len(images) <= 80  # some may still wait to be sent
+    assert all(np.diff([image.utime for image in images]) >= 0)
+    assert "connection lost; reconnecting" in words and "secret" not in printed + words
+
+
+def test_a_refused_rtsp_camera_is_one_line_without_the_password(rtsp):
+    with pytest.raises(UserError, match="cannot be opened") as caught:
+        StreamSource(rtsp.url)
+    assert "secret" not in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

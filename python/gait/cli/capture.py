@@ -133,7 +133,8 @@ def _send(
     pacer = publisher.begin(source, float("inf") if source.live else rate, args.wait)
     total = None if isinstance(source, DeviceSource) or args.loop else (args.stop or source.video.count)
     with progress("sending", total, args.quiet) as update, suppress(KeyboardInterrupt):
-        publisher.send(frames, pacer, update, signals.uninterrupted)
+        stop = source.stop if isinstance(source, DeviceSource) else lambda: None
+        publisher.send(frames, pacer, update, signals.uninterrupted, stop)
     return pacer
 
 

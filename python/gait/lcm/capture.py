@@ -104,6 +104,9 @@ class DeviceSource:
             number += 1
         raise UserError(f"{self._name}: sends no more frames; is it unplugged?")
 
+    def stop(self) -> None:
+        """Make `frames`, in another thread, end instead of waiting for a camera that may not return."""
+
 
 def is_device(name: str) -> bool:
     """Whether a source is a camera of this machine, not a file."""
@@ -279,13 +282,14 @@ class Publisher:
         pacer: Pacer,
         done: Callable[[int], None],
         whole: Callable[[], AbstractContextManager[None]] = nullcontext,
+        stop: Callable[[], None] = lambda: None,
     ) -> None:
         """Send each frame when it is due; call `done` with its number.
 
-        Messages are sent in a block of `whole`, in which interrupts wait.
+        Messages are sent in a block of `whole`, in which interrupts wait; `stop` ends the source of `frames`.
         """
         channel = f"GAIT_IMAGE_{self._setup.stream}"
-        for number, seconds, data in ahead(self._encoded(frames, pacer), _AHEAD):
+        for number, seconds, data in ahead(self._encoded(frames, pacer), _AHEAD, stop):
             if seconds - self._announced >= ANNOUNCE and not self._setup.cameras:
                 self._announced = seconds
                 with whole():

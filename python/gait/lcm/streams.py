@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -47,6 +48,7 @@ class StreamSource(DeviceSource):
     def __init__(self, url: str, *, grey: bool = False, quiet: bool = False) -> None:
         self._url, self._grey, self._quiet = url, grey, quiet
         self._name = _LOGIN.sub("", url)  # no password in messages
+        self._stopped = threading.Event()
         self._opened = time.monotonic()
         self._frames = self._connect(_FIRST)
         try:
@@ -59,9 +61,9 @@ class StreamSource(DeviceSource):
         self._frames = chain([first], self._frames)
 
     def frames(self) -> Iterator[Frame]:
-        """Yield frames without end, as they arrive."""
+        """Yield frames as they arrive, until `stop` is called."""
         number = 0
-        while True:
+        while not self._stopped.is_set():
             try:
                 for frame in self._frames:
                     if (frame.width, frame.height) != self.size:
@@ -76,6 +78,10 @@ class StreamSource(DeviceSource):
                 pass
             self._frames = self._again()
 
+    def stop(self) -> None:
+        """Do not reconnect any more."""
+        self._stopped.set()
+
     def _connect(self, limit: float) -> Iterator[av.VideoFrame]:
         """Open the stream, in two steps of at most `limit` seconds, and decode it; errors are `BROKEN`'s."""
         with closing(av.open(self._url, options=_OPTIONS, timeout=(limit, _READ))) as container:
@@ -84,11 +90,10 @@ class StreamSource(DeviceSource):
             yield from container.decode(video=0)
 
     def _again(self) -> Iterator[av.VideoFrame]:
-        """Reconnect until a frame arrives."""
+        """Reconnect until a frame arrives; none if `stop` is called before."""
         note(f"{self._name}: connection lost; reconnecting", self._quiet)
         lost, waits = time.monotonic(), chain(_WAITS, iter(lambda: _WAITS[-1], None))
-        while True:
-            time.sleep(next(waits))
+        while not self._stopped.wait(next(waits)):
             frames = self._connect(self._limit)
             try:
                 first = next(frames)
@@ -96,3 +101,4 @@ class StreamSource(DeviceSource):
                 continue
             note(f"{self._name}: back after {time.monotonic() - lost:.1f} s", self._quiet)
             return chain([first], frames)
+        return iter(())
