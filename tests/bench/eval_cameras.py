@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Tracks with one and with two cameras, and the time offset found between films compared with the true one.
 
-    eval_cameras.py [--record] [--seeds 501,502,503] [--frames 110] [--late 0.5]
+    eval_cameras.py [--record] [--seeds 501,502] [--frames 90] [--late 0.5]
 
 Simulated walks (gait simulate --cameras 2), from the side, at 45 degrees and towards the first camera, are
 tracked with the detector and all defaults.  The second film is used once as it is and once cut to begin
@@ -37,8 +37,8 @@ WANTED = 40.0  # mm, median over frames of the distance of joints from where the
 def main() -> int:
     """Make, track, compare, print; exit code 1 if walks towards the camera miss the target."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    options.add_argument("--seeds", default="501,502,503")
-    options.add_argument("--frames", type=int, default=110)
+    options.add_argument("--seeds", default="501,502")
+    options.add_argument("--frames", type=int, default=90)
     options.add_argument("--late", type=float, default=0.5, help="seconds")
     options.add_argument("--record", action="store_true")
     args = options.parse_args()

@@ -79,7 +79,7 @@ def _with_own_body(options: ClipOptions, scene: Scene) -> Scene:
 
 
 def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | None = None) -> dict[str, Any]:
-    """Track the person of a scene from a start; `also` receives each estimate that is written."""
+    """Track the person of a scene from a start; `also` receives those with the model's joints."""
     if options.background == "auto" and scene.empty is not None and (start.in_place or stays(scene)):
         scene = scene.without_plate()  # the median shows the person
     used = setup(options, scene, start, scene.empty is not None)

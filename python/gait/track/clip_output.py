@@ -24,6 +24,7 @@ from gait.progress import durations, progress
 from gait.report.drawing import LEGEND_SECONDS, Overlay
 from gait.report.film import Films, PageFilm
 from gait.track.from_walk import Calibration
+from gait.track.measured_joints import MeasuredJoints
 from gait.track.options import ClipOptions
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
@@ -120,9 +121,10 @@ def write(
     keypoints: PersonKeypoints | None,
     also: Sink | None = None,
 ) -> Results:
-    """Write the estimates to all outputs, which appear together at the end, and to `also`.
+    """Write the estimates to all outputs, which appear together at the end.
 
-    Keypoints, if there are any, show in which frames the person takes no strides.
+    Keypoints, if there are any, show in which frames the person takes no strides, and in several cameras
+    where the joints are.  `also` receives the estimates with the joints of the model's body.
     """
     model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
     with ExitStack() as stack:
@@ -139,8 +141,6 @@ def write(
             file = stack.enter_context(replacing(options.cameras_out))
             write_path(file, span, poses, by_frame=True, lens=scene.camera)
         sinks: list[Sink] = [results.add, _widened(stack.enter_context(rows).write, scene.calibration)]
-        if also is not None:
-            sinks.append(also)
         size = Drawing.size(scene)
         films = stack.enter_context(Films(options.overlay, options.report, span, size, video.fps))
         if films.wanted:
@@ -153,6 +153,10 @@ def write(
             estimates = Standing(keypoints).decided(estimates)
         if not options.smooth:  # frames are tracked while earlier ones are written
             estimates = stack.enter_context(closing(ahead(estimates)))
+        if also is not None:
+            estimates = _passed(estimates, also)
+        if keypoints is not None and scene.further:
+            estimates = MeasuredJoints(tracker.cameras, keypoints).moved(estimates)
         for frame, estimate in estimates:
             for sink in sinks:
                 sink(frame, estimate)
@@ -224,6 +228,13 @@ def _widened(sink: Sink, calibration: Calibration | None) -> Sink:
     if calibration is None:
         return sink
     return lambda frame, estimate: sink(frame, calibration.widened(frame.time, estimate))
+
+
+def _passed(found: Iterable[Estimated], to: Sink) -> Iterator[Estimated]:
+    """Yield every frame with its estimate after passing them to a sink."""
+    for frame, estimate in found:
+        to(frame, estimate)
+        yield frame, estimate
 
 
 def _counted(

@@ -30,6 +30,7 @@ from gait.errors import UserError
 from gait.io import blob
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame
+from gait.track.measured_joints import STUDENT_DEGREES, on_nearer_sides, slopes
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene
 
@@ -39,7 +40,6 @@ _SD = 0.012  # statures: between people and between conventions of where a joint
 _TRACK_SD = (0.1, 0.1, 0.03, 0.05, 0.03)  # of the whole track: forward, left, up, metres; heading; size
 _SHARED = _OWN = 0.5  # of the detector's lasting sd: fixed to the body, and of each camera
 _LEAST = 15  # frames that are `tracking`
-_DEGREES = 4.0  # of freedom of Student's t
 _ROUNDS = 3  # of robust weights
 
 
@@ -154,15 +154,7 @@ def _view(camera: Camera, found: Keypoints, names: list[str], numbers: Array, jo
     columns = [found.names.index(name) for name in names]
     tall = np.maximum(picture_height(found)[at], 1.0)
     uv = np.where(visible[:, None, None], found.uv[at][:, columns], np.nan)
-    other = {"l_": "r_", "r_": "l_"}
-    swapped = uv[:, [names.index(other.get(name[:2], name[:2]) + name[2:]) for name in names]]
-    expected = camera.project(joints)
-    usual = 0.04 * tall[:, None]
-    costs = [
-        np.nansum(np.log1p(np.sum((points - expected) ** 2, axis=2) / usual**2), axis=1)
-        for points in (uv, swapped)
-    ]
-    uv = np.where((costs[1] < costs[0])[:, None, None], swapped, uv)
+    uv = on_nearer_sides(uv, camera.project(joints), names, tall)
     lasting = np.nanmean(found.lasting_sd[at][:, columns] / tall[:, None], axis=0)
     return _View(camera, uv, found.sd[at][:, columns], _OWN * lasting, tall)
 
@@ -172,14 +164,11 @@ def _means(view: _View, joints: Array, J: Array) -> tuple[Array, Array, Array]:
 
     In shares of the person's height in the picture.
     """
-    expected, step = view.camera.project(joints), 1e-3
-    slopes = np.stack(
-        [(view.camera.project(joints + step * way) - expected) / step for way in np.eye(3)], axis=-1
-    )
-    rows = np.einsum("tjab,tjbn->tjan", slopes, J)
+    expected = view.camera.project(joints)
+    rows = np.einsum("tjab,tjbn->tjan", slopes(view.camera, joints), J)
     errors = view.uv - expected
     square = np.sum(errors**2, axis=2) / (view.sd**2 + (view.lasting * view.tall[:, None]) ** 2)
-    weight = np.nan_to_num(1.0 / (view.sd**2 * (1.0 + square / _DEGREES))) * view.tall[:, None]
+    weight = np.nan_to_num(1.0 / (view.sd**2 * (1.0 + square / STUDENT_DEGREES))) * view.tall[:, None]
     total = (weight * view.tall[:, None]).sum(axis=0)
     used = total > 0
     mean = weight[:, used] / total[used]

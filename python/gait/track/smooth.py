@@ -290,8 +290,9 @@ class Smoother:
         self._spool.__exit__(None, None, None)
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
-        """Add a frame after the tracker's step; its picture is not kept."""
-        self._filtered.append((frame._replace(image=_NOTHING, plate=None), estimate))
+        """Add a frame after the tracker's step; its pictures are not kept."""
+        others = tuple(view and view._replace(image=_NOTHING) for view in frame.others)
+        self._filtered.append((frame._replace(image=_NOTHING, plate=None, others=others), estimate))
         self._stature_sd.append(self._tracker.start_stature_sd)
         self._spool.add(self._tracker, estimate)
 
