@@ -79,16 +79,16 @@ def keypoints(true: np.ndarray, cameras: int, swapped: range = range(0)) -> Pers
     for c, camera in enumerate(CAMERAS[:cameras]):
         found = {}
         for k, joints in enumerate(true):
-            seen = joints[other if c and k in swapped else SEEN]
-            uv = camera.project(seen) + NOISE * rng.standard_normal((len(SEEN), 2))
+            observed = joints[other if c and k in swapped else SEEN]
+            uv = camera.project(observed) + NOISE * rng.standard_normal((len(SEEN), 2))
             found[k] = FrameKeypoints([NAMES[j] for j in SEEN], uv, NOISE)
         views.append(PersonKeypoints(camera, {0: found}, 0))
     return PersonKeypoints(CAMERAS[0], views[0]._keypoints, 0, further=views[1:])
 
 
-def moved(track: list[Estimate], seen: PersonKeypoints, cameras: int) -> list[Estimate]:
+def moved(track: list[Estimate], observed: PersonKeypoints, cameras: int) -> list[Estimate]:
     """The track after the measurement, whose frames must be those before it."""
-    pairs = list(MeasuredJoints(CAMERAS[:cameras], seen).moved(zip(frames(cameras), track, strict=True)))
+    pairs = list(MeasuredJoints(CAMERAS[:cameras], observed).moved(zip(frames(cameras), track, strict=True)))
     assert [frame.number for frame, _ in pairs] == list(range(FRAMES))
     return [estimate for _, estimate in pairs]
 
@@ -105,7 +105,7 @@ def test_two_cameras_move_joints_to_the_persons(swapped: range) -> None:
     np.testing.assert_array_equal(errors[:, rest], before[:, rest])
     sd = np.array([one.joint_sd for one in after])[:, SEEN]
     assert (sd < 0.8 * SD).all()
-    assert 0.85 < (np.abs(errors[:, SEEN]) < 1.645 * sd).mean()
+    assert (np.abs(errors[:, SEEN]) < 1.645 * sd).mean() > 0.85
     assert after[9].mean == track[9].mean  # the state is the tracker's
 
 
@@ -121,9 +121,9 @@ def test_one_camera_and_lost_frames_change_nothing() -> None:
 
 def test_frames_that_one_camera_missed_fade_to_the_models_joints() -> None:
     track, true = walk()
-    seen = keypoints(true, 2)
+    observed = keypoints(true, 2)
     films = [frame._replace(others=(None,)) if frame.number >= 15 else frame for frame in frames(2)]
-    after = [one for _, one in MeasuredJoints(CAMERAS, seen).moved(zip(films, track, strict=True))]
+    after = [one for _, one in MeasuredJoints(CAMERAS, observed).moved(zip(films, track, strict=True))]
     moves = [np.abs(one.joints - before.joints).max() for one, before in zip(after, track, strict=True)]
     assert moves[5] > moves[15] > moves[18] > 0.0 and max(moves[22:]) == 0.0
 
