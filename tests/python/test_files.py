@@ -274,29 +274,29 @@ def test_what_a_killed_command_left_is_named_and_kept(tmp_path, capsys):
         "with replacing(sys.argv[1]) as path: path.write_text(sys.argv[2]); os.kill(os.getpid(), 9)"
     )
     path = tmp_path / "a.csv"
-    for text in ("an hour of work", "", "another"):
+    for text in ("head\nan hour of work\ncut of", "head\n", "", "head\nanother\n"):
         subprocess.run([sys.executable, "-c", program, str(path), text], check=False)
-    left = [p for p in tmp_path.iterdir() if p.name.startswith(".a.")]
-    assert len(left) == 3
-    with replacing(path) as temporary:  # they may still be young, of a command that has just begun
+    empty, last = sorted(
+        tmp_path.glob(".a.*"), key=os.path.getsize
+    )  # each command found what was left before
+    with replacing(path) as temporary:  # an empty one may be of a command that has just begun
         temporary.write_text("new")
-    assert {p.name for p in tmp_path.iterdir()} == {"a.csv", *(p.name for p in left)}
-    for one in left:
-        os.utime(one, (0, 0))
+    assert empty.exists() and not last.exists()
+    os.utime(empty, (0, 0))
     with replacing(path) as open_now, replacing(path) as temporary:
         os.utime(open_now, (0, 0))  # old, but its writer is alive
         open_now.write_text("first")
         temporary.write_text("second")
     assert path.read_text() == "first"
     kept = [tmp_path / "a.unfinished.csv", tmp_path / "a.unfinished-2.csv"]  # neither replaces the other
-    assert {p.read_text() for p in kept} == {"an hour of work", "another"}
+    assert {p.read_text() for p in kept} == {"head\nan hour of work\n", "head\nanother\n"}
     assert set(tmp_path.iterdir()) == {path, *kept}
-    assert "was killed; what it wrote is in a.unfinished.csv" in capsys.readouterr().err
+    assert "was killed; what it wrote is in a.unfinished-2.csv" in capsys.readouterr().err
 
 
 def test_leftovers_that_are_not_ours_or_cannot_be_renamed_stay(tmp_path, monkeypatch):
     path, left = tmp_path / "a.csv", tmp_path / f".a.{'0' * 16}.csv"
-    left.write_text("theirs")
+    left.write_text("head\ntheirs\n")
     os.utime(left, (0, 0))
 
     def refuse(*names):
@@ -305,7 +305,7 @@ def test_leftovers_that_are_not_ours_or_cannot_be_renamed_stay(tmp_path, monkeyp
     def write(text):
         with replacing(path) as temporary:
             temporary.write_text(text)
-        assert path.read_text() == text and left.read_text() == "theirs"
+        assert path.read_text() == text and left.read_text() == "head\ntheirs\n"
 
     with monkeypatch.context() as other:
         other.setattr("os.geteuid", lambda: os.getuid() + 1)

@@ -9,7 +9,8 @@ import lcm_rig as rig
 import pytest
 
 from gait.bindings.state import State
-from gait.lcm.link import gaitmsg
+from gait.errors import UserError
+from gait.lcm.link import gaitmsg, private_url, publisher
 from gait.lcm.messages import command_message
 
 
@@ -73,6 +74,33 @@ def test_a_log_without_the_mode_of_writing_is_refused(tmp_path, mode):
     before = old.read_bytes()
     one_line(run(log(tmp_path), f"file://{old}{mode}"), 2, "add ?mode=w")
     assert old.read_bytes() == before
+
+
+@pytest.mark.parametrize("mode", ["w", "a"])
+def test_a_log_has_one_writer(tmp_path, mode):
+    """Until it ends, also if it is killed."""
+    rig.need_multicast()
+    source, out = log(tmp_path), tmp_path / "out.log"
+    (tmp_path / "link.log").symlink_to(out)
+    words = rig.command("--url", private_url(), "--out", f"file://{out}?mode={mode}")
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as first:
+        try:
+            assert first.stderr and "listening" in first.stderr.readline()
+            number = out.stat().st_ino
+            for name in ("out.log", "link.log"):
+                done = run(source, f"file://{tmp_path / name}?mode={mode}")
+                one_line(done, 1, f"{name}: another program is writing this log; give another name")
+            with (
+                pytest.raises(UserError, match="another program is writing this file; give another name"),
+                publisher(f"file://{out}?mode={mode}"),
+            ):
+                pass
+            assert out.stat().st_ino == number
+        finally:
+            first.kill()
+    assert run(source, f"file://{out}?mode={mode}").returncode == 0
+    with publisher(f"file://{out}?mode=a"):  # the command that adds to it, too
+        one_line(run(source, f"file://{out}?mode={mode}"), 1, "another program is writing this log")
 
 
 def test_a_log_can_be_added_to(tmp_path):

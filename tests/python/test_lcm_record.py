@@ -7,6 +7,7 @@ import signal
 import struct
 import subprocess
 import threading
+import time
 from copy import copy
 
 import lcm_rig as rig
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 from gait.io.track_file import read_track
-from gait.lcm.link import LogWriter, break_of, gaitmsg, open_lcm, private_url
+from gait.lcm.link import LogWriter, break_of, events_of, gaitmsg, open_lcm, private_url
 from gait.lcm.record import read_run
 
 COUNT = 20
@@ -72,6 +73,33 @@ def test_an_interrupted_recording_is_whole(estimates, tmp_path, number, flowing)
     if not flowing:
         assert track.frame.tolist() == [e.frame for e in estimates]
     assert [path.name for path in tmp_path.iterdir()] == ["track.csv"]
+
+
+def test_what_a_killed_recorder_had_written_is_kept_by_the_next(estimates, tmp_path):
+    rig.need_multicast()
+    url, out, log = private_url(), tmp_path / "track.csv", tmp_path / "e.log"
+    words = ["-o", str(out), "--log", str(log)]
+    with subprocess.Popen(
+        [str(rig.PYTHON), "-m", "gait", "record", "--url", url, *words], stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stderr and process.stderr.readline().startswith("listening")
+            link, sent = open_lcm(url), 0
+            while sum(p.stat().st_size > 0 for p in tmp_path.glob(".*")) < 2:
+                assert process.poll() is None
+                at = {"frame": sent, "step": sent, "utime": SECOND + 1000 * sent}
+                link.publish("GAIT_ESTIMATE", later(estimates[-1], sent, **at).encode())
+                sent += 1
+                time.sleep(0.002)  # let it read
+        finally:
+            process.kill()
+    played = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
+    done = rig.gait("record", "--url", f"file://{played}?speed=0", *words)
+    assert done.returncode == 0 and "was killed; what it wrote is in track.unfinished.csv" in done.stderr
+    assert 0 < len(read_track(tmp_path / "track.unfinished.csv").frame) <= sent
+    kept = list(events_of(tmp_path / "e.unfinished.log", whole=False))
+    assert 0 < len(kept) <= sent and len(read_track(out).frame) == COUNT
+    assert not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize("option", ["-o", "--log"])

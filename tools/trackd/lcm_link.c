@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -192,6 +193,19 @@ const char *link_channel(const char *channel, int person, char name[LINK_CHANNEL
 }
 
 /* ---- output ---- */
+/* Lock a log before it is emptied; a kill releases the lock.  Only files are locked; what else cannot be opened is reported
+ * when the log is. */
+static bool lock(sink *s, const char *path, message *why)
+{
+    struct stat is;
+    s->lock = open(path, O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
+    if (s->lock < 0 || fstat(s->lock, &is) != 0 || !S_ISREG(is.st_mode) ||
+        flock(s->lock, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)
+        return true;
+    close(s->lock);
+    return message_set(why, "--out %.160s: another program is writing this log; give another name", path);
+}
+
 bool sink_open(sink *s, const char *url, message *why)
 {
     char path[LINK_PATH];
@@ -199,8 +213,15 @@ bool sink_open(sink *s, const char *url, message *why)
     *s = (sink){0};
     if (!link_is_log(url))
         return (s->lcm = link_open(url, why)) != NULL;
+    if (!lock(s, path, why))
+        return false;
     s->log = lcm_eventlog_create(path, mode);
-    return s->log || message_set(why, "%.160s: this log cannot be written: %s", path, strerror(errno));
+    if (s->log)
+        return true;
+    message_set(why, "%.160s: this log cannot be written: %s", path, strerror(errno));
+    if (s->lock >= 0)
+        close(s->lock);
+    return false;
 }
 
 static void lost(sink *s, const char *what)
@@ -259,6 +280,8 @@ bool sink_close(sink *s, message *why)
                                 s->log ? "the log cannot be written:" : "messages were lost:", s->fault.text);
     if (s->log)
         lcm_eventlog_destroy(s->log);
+    if (s->log && s->lock >= 0)
+        close(s->lock);
     *s = (sink){0};
     return ok;
 }

@@ -35,11 +35,12 @@ char link_log(const char *url, char path[LINK_PATH]);
 typedef struct sink {    /* all zero: no output */
     lcm_t *lcm;          /* or NULL */
     lcm_eventlog_t *log; /* or NULL */
+    int lock;            /* with a log: descriptor that locks it, or -1 */
     int64_t failed;      /* messages that did not go out */
     message fault;       /* of the first of them */
 } sink;
 
-/* Open `url`; a log has ?mode=w (new) or a (append). */
+/* Open `url`; a log has ?mode=w (new) or a (append), and no other writer. */
 bool sink_open(sink *s, const char *url, message *why);
 /* Publish `size` bytes on the channel of a person, 0: of all.  The first failure of LCM is reported on stderr; after
  * a failure of a log nothing more is written. */

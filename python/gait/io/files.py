@@ -19,7 +19,8 @@ from gait.progress import note
 
 #: Disk full, user's quota exceeded, file too large, or a disk error.
 WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-#: Seconds after which an unlocked temporary file must be left over from a killed command.
+#: Seconds after which an unlocked temporary file must be left over from a killed command even if it is empty:
+#: a younger one may have just been created, and not locked yet.
 _LEFTOVER_AGE_S = 60.0
 
 
@@ -50,6 +51,7 @@ def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | No
         yield temporary
         _flush(temporary)
         os.replace(temporary, target)
+        fcntl.flock(descriptor, fcntl.LOCK_UN)
         _flush(target.parent)
     except BaseException as error:
         is_there = temporary.exists()  # neither if creating it failed nor after it got its name
@@ -84,8 +86,23 @@ def flush(descriptor: int) -> None:
             raise
 
 
+def lock(descriptor: int, path: str | os.PathLike[str]) -> None:
+    """Lock an open file until it is closed; UserError if another program has, as it writes the file."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise UserError(f"{path}: another program is writing this file; give another name") from None
+
+
+def require_unlocked(path: str | os.PathLike[str]) -> None:
+    """Raise UserError if another program is writing an existing file in place, as gait-trackd writes logs."""
+    if Path(path).is_file():
+        with open(path, "rb") as file:
+            lock(file.fileno(), path)
+
+
 def _recover(target: Path) -> None:
-    """Rename our files left by killed writers of `target`, and report them; remove empty ones."""
+    """Rename our files left by killed writers of `target`, and report them; remove those without contents."""
     pattern = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{16}}{re.escape(target.suffix)}")
     try:
         names = [name for name in os.listdir(target.parent) if pattern.fullmatch(name)]
@@ -93,10 +110,19 @@ def _recover(target: Path) -> None:
         return
     for left in filter(_is_left, map(target.with_name, names)):
         with suppress(OSError):  # another command was faster
-            if left.stat().st_size == 0:
+            if left.stat().st_size == 0 or (target.suffix == ".csv" and not end_at_a_row(left)):
                 left.unlink()
             else:
                 _keep(left, target, "the command that wrote it was killed; what it wrote")
+
+
+def end_at_a_row(table: Path) -> bool:
+    """Cut off an incomplete last row; return whether any rows remain below the header."""
+    with table.open("r+b") as file:
+        whole = file.read()
+        whole = whole[: whole.rfind(b"\n") + 1]
+        file.truncate(len(whole))
+    return whole.count(b"\n") > 1
 
 
 def is_unfinished(path: str | os.PathLike[str]) -> bool:
@@ -130,7 +156,7 @@ def _is_left(temporary: Path) -> bool:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         found = os.fstat(descriptor)
         is_ours = stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid()
-        return is_ours and time.time() - found.st_mtime > _LEFTOVER_AGE_S
+        return is_ours and (found.st_size > 0 or time.time() - found.st_mtime > _LEFTOVER_AGE_S)
     except OSError:
         return False
     finally:

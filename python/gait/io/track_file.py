@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import TracebackType
 
 import numpy as np
@@ -21,7 +20,7 @@ from gait.bindings.estimate import Estimate
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.errors import UserError
 from gait.io.fields import frame_numbers
-from gait.io.files import is_unfinished, replacing, require_file
+from gait.io.files import end_at_a_row, is_unfinished, replacing, require_file
 from gait.io.video import Frame, Video
 
 Array = NDArray[np.float64]
@@ -106,7 +105,7 @@ class TrackWriter:
         self._stack = ExitStack()
 
     def __enter__(self) -> TrackWriter:
-        temporary = self._stack.enter_context(replacing(self.path, partial=_end_at_a_row))
+        temporary = self._stack.enter_context(replacing(self.path, partial=end_at_a_row))
         file = self._stack.enter_context(open(temporary, "w", newline="", encoding="utf-8"))
         self._csv = csv.writer(file, lineterminator="\n")
         self._csv.writerow(self._header)
@@ -161,15 +160,6 @@ class TrackWriter:
 
 def _or_empty(value: float) -> str:
     return "" if np.isnan(value) else f"{value:.6f}"
-
-
-def _end_at_a_row(path: Path) -> bool:
-    """Cut off an incomplete last row; return whether any rows remain below the header."""
-    with path.open("r+b") as file:
-        whole = file.read()
-        whole = whole[: whole.rfind(b"\n") + 1]
-        file.truncate(len(whole))
-    return whole.count(b"\n") > 1
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import struct
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager, nullcontext
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from importlib import import_module
 from io import BufferedWriter, FileIO
 from ipaddress import ip_address
@@ -21,7 +21,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from gait.errors import UsageError, UserError
-from gait.io.files import flush, replacing, require_file
+from gait.io.files import flush, lock, replacing, require_file, require_unlocked
 
 _HERE = Path(__file__).resolve().parent
 _PLACES = (_HERE.parent / "lib", _HERE.parents[2] / "build" / "lcm" / "python")
@@ -142,20 +142,27 @@ class LogWriter:
     mode : str
         ``w``: new file; ``a``: append.
     name : str, optional
-        Name of the file in messages, if it is written under another one.
+        Name that the file will have, if it is written under another one; it is the name in messages.
 
     Raises
     ------
     UserError
-        If the log cannot be written; all methods raise it.
+        If the log cannot be written, which all methods raise, or another program is writing it.
     """
 
     def __init__(self, path: str | os.PathLike[str], mode: str = "w", name: str | None = None) -> None:
         self._name, self._events = name or path, 0
+        if mode == "w" and name is not None:
+            require_unlocked(name)
         try:
             self._file = BufferedWriter(FileIO(path, mode))
         except OSError as error:
             raise self._fault(error) from None
+        if mode == "a":
+            with ExitStack() as refused:
+                refused.callback(self._file.close)
+                lock(self._file.fileno(), path)
+                refused.pop_all()
 
     def write(self, utime: int, channel: str, data: bytes) -> None:
         """Append an event with time `utime`, microseconds since the Unix epoch."""
