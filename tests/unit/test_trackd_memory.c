@@ -1,4 +1,4 @@
-/* A daemon without enough memory: whichever of its allocations fails, it says so, and nothing is lost or half open.  Files
+/* A daemon without enough memory: whichever of its allocations fails, it is reported, and nothing is lost or half open.  Files
  * that cannot be read, and threads that cannot be started. */
 #define _XOPEN_SOURCE 700 /* P_tmpdir */
 #include <stdbool.h>

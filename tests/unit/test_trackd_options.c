@@ -103,7 +103,7 @@ static void test_file(void)
                "seconds = 3"));
     CHECK(v.flag && strcmp(v.text, "a # b") == 0 && v.whole == 7 && v.seed == 9 && v.share == 0.25f);
     CHECK(v.seconds == 3 && file("text = 'it \"is\"'\n") && strcmp(v.text, "it \"is\"") == 0);
-    CHECK(file("text = bare words\n") && strcmp(v.text, "bare words") == 0);
+    CHECK(file("text = plain words\n") && strcmp(v.text, "plain words") == 0);
 }
 
 static void test_bad_files(void)

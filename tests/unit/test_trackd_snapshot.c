@@ -235,6 +235,105 @@ static void test_torn(void)
     free(whole.data);
 }
 
+/* ---- files with a correct checksum that do not fit ---- */
+static file_bytes fitting;
+
+static void seal(void)
+{
+    uint64_t const checksum = checksum_of(fitting.data, fitting.size);
+    memcpy(fitting.data + offsetof(head, checksum), &checksum, sizeof checksum);
+}
+
+/* The same file with these bytes of it replaced, is refused for this reason. */
+static void refused(size_t at, const void *bytes, size_t n, const char *reason)
+{
+    unsigned char kept[64];
+    message why = {.text = ""};
+    memcpy(kept, fitting.data + at, n);
+    memcpy(fitting.data + at, bytes, n);
+    seal();
+    s.last_utime = 5; /* resuming would set it */
+    bool const used = resume(path, &s, &fitting, &why);
+    CHECK(s.last_utime == 5 && strstr(why.text, reason));
+    CHECK(used == (at >= sizeof(head))); /* of several people the others are still used */
+    memcpy(fitting.data + at, kept, n);
+    seal();
+}
+
+#define REFUSED(at, type, value, reason)                                                                     \
+    do {                                                                                                     \
+        type const bad = value;                                                                              \
+        refused(at, &bad, sizeof bad, reason);                                                               \
+    } while (0)
+
+static void test_fit(void)
+{
+    enum { RECORD = sizeof(head) };
+    message why;
+    CHECK(save(0, 0));
+    fitting = content();
+    REFUSED(offsetof(head, magic), char, 'g', "not a snapshot of this version");
+    REFUSED(offsetof(head, cameras), int32_t, 2, "another number of cameras");
+    REFUSED(offsetof(head, stream), int32_t, 7, "for --stream 7");
+    REFUSED(offsetof(head, camera) + offsetof(gait_camera, width), int32_t, 0, "size of 0x32");
+    REFUSED(offsetof(head, camera) + offsetof(gait_camera, height), int32_t, 33, "--max-pixels leaves");
+    REFUSED(offsetof(head, camera) + offsetof(gait_camera, fx), float, 51, "other than --camera");
+    REFUSED(offsetof(head, people), int32_t, 2, "shorter or longer");
+    REFUSED(offsetof(head, people), int32_t, 0, "shorter or longer");
+    REFUSED(RECORD + offsetof(record, person), int64_t, 2, "--people is less");
+    REFUSED(RECORD + offsetof(record, utime), int64_t, -1, "time -1 is out of range");
+    REFUSED(RECORD + offsetof(record, frame), int64_t, -2, "damaged record");
+    REFUSED(RECORD + offsetof(record, steps), int64_t, -1, "damaged record");
+    REFUSED(RECORD + offsetof(record, steps), int64_t, INT64_MAX, "damaged record");
+    REFUSED(RECORD + sizeof(record), char, 'g', "not a tracker snapshot");
+    s.person = 1; /* people have numbers now, that of the file has none */
+    REFUSED(RECORD + offsetof(record, person), int64_t, 0, "it has no number, but people have");
+    s.person = 0;
+    file_bytes part = {fitting.data, RECORD - 1};
+    CHECK(!resume(path, &s, &part, &why) && strstr(why.text, "too short"));
+    s.slot.fixed = true; /* that of --camera may be larger than announced ones */
+    s.max_pixels = 1;
+    s.last_utime = 5;
+    CHECK(resume(path, &s, &fitting, &why) && s.last_utime == 33333);
+    s.slot.fixed = false;
+    s.max_pixels = 48 * 32;
+    free(fitting.data);
+}
+
+/* Lengths are checked before anything is read; a file that is longer states its lengths, too. */
+static void test_lengths(void)
+{
+    CHECK(save(0, 0));
+    file_bytes const whole = content();
+    for (size_t n = 0; n < 4; n++) {
+        static const uint64_t bad[] = {0, UINT64_MAX, 1 << 20, 7};
+        fitting = (file_bytes){malloc(whole.size), whole.size};
+        memcpy(fitting.data, whole.data, whole.size);
+        refused(offsetof(head, people), &(int32_t){3}, sizeof(int32_t), "shorter or longer");
+        memcpy(fitting.data + sizeof(head) + offsetof(record, bytes), &bad[n], sizeof bad[n]);
+        refused(0, MAGIC, sizeof MAGIC, "shorter or longer");
+        free(fitting.data);
+    }
+    free(whole.data);
+}
+
+/* A snapshot without a folder in its name is beside the others of the working folder. */
+static void test_working_folder(void)
+{
+    snapshot_file f = {.path = "state"};
+    char before[1024];
+    message why;
+    if (!getcwd(before, sizeof before) || chdir(folder) != 0)
+        abort();
+    write_file("state.2147483646.0123abcd", "x", 1);
+    called = fail_at = 0;
+    CHECK(snapshot_file_check(&f, &why) && access("state.2147483646.0123abcd", F_OK) != 0);
+    snapshot_file_write(&f, &s, true);
+    CHECK(!f.failed && access("state", F_OK) == 0);
+    if (chdir(before) != 0)
+        abort();
+}
+
 /* Leftovers of killed daemons are removed; those of running ones and other files stay. */
 static void test_leftovers(void)
 {
@@ -298,6 +397,9 @@ int main(void)
     test_no_memory();
     test_interrupted_and_short_writes();
     test_torn();
+    test_fit();
+    test_lengths();
+    test_working_folder();
     test_leftovers();
     test_own();
     test_large();
