@@ -150,7 +150,8 @@ GAIT_API gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, co
 GAIT_API gait_result gait_lift_expect(gait_lift *l, const double place[3], double heading, double heading_sd,
                                       gait_error *err);
 /* The rest of this section is about the last gait_lift_segment(); GAIT_ERR_STATE: there is none.
- * Posterior mean [F][J][3] and standard deviation [F][J][3] (may be NULL), metres, world. */
+ * Posterior mean [F][J][3] and standard deviation [F][J][3] (may be NULL), metres, world.  GAIT_ERR_NUMERIC: they are
+ * not finite, because an observation or the config is absurd. */
 GAIT_API gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_error *err);
 /* The unknowns [n], n = gait_lift_unknowns(), each with prior N(0, 1): modes, position x y z, and stature and heading
  * if unknown; and their covariance [n][n] (may be NULL). */
@@ -195,7 +196,8 @@ typedef struct gait_lift_frame { GAIT_LIFT_FRAME_FIELDS(GAIT_DECLARE) } gait_lif
  * first frame on; each frame is added, at its own time (linear between their frames), to the segments that contain
  * it.  Points far from their prediction are down-weighted. */
 GAIT_API gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err);
-/* Estimate of the frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: fewer frames since the start. */
+/* Estimate of the frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: fewer frames since the start;
+ * GAIT_ERR_NUMERIC: as of gait_lift_positions(). */
 GAIT_API gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out, gait_error *err);
 /* Forget the stream. */
 GAIT_API void        gait_lift_reset(gait_lift *l);

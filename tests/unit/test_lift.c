@@ -2,6 +2,7 @@
  * standard deviations. The algebra itself is compared with numpy's in tests/python/test_lifter.py. */
 #include "gait.h"
 
+#include <float.h>
 #include <stdbool.h>
 
 #include "toy_lift.h"
@@ -304,6 +305,40 @@ static void test_expected_and_unknown(void)
     CHECK(gait_lift_expect(l, place, 0.7, 0.2, NULL) == GAIT_ERR_STATE);
 }
 
+/* A person without size, seen with errors that are far below rounding: an answer is finite, or there is none. */
+static void test_absurd(void)
+{
+    static const double tiny[] = {1e-10, 1e-38, 1e-100, 1e-200, 1e-300};
+    static double x[TOY_SEGMENT * 3], e[TOY_SEGMENT * 3], weighted[TOY_SEGMENT];
+    int refused = 0;
+    for (size_t k = 0; k < sizeof tiny / sizeof *tiny; k++)
+        for (int robust = 0; robust < 2; robust++) {
+            gait_lift_config c = toy_lift_config(GAIT_LIFT_ORTHOGRAPHIC);
+            gait_lift_fit fit;
+            double scale = 1.0, finite = 0.0;
+            c.stature = 1e-38;
+            c.heading_sd = 0.0;
+            gait_lift *const l = toy_lift_open(&c);
+            for (int i = 0; i < TOY_SEGMENT; i++) {
+                uv[2 * i] = 24.0 + i % 7;
+                uv[2 * i + 1] = 8.0 + i % 13;
+                sds[i] = i % 3 ? 2.0 : tiny[k];
+            }
+            gait_result const found = robust ? gait_lift_segment_robust(l, uv, sds, weighted, &fit, NULL)
+                                             : gait_lift_segment(l, uv, sds, &fit, NULL);
+            gait_result const read = gait_lift_positions(l, x, e, NULL);
+            gait_result const scaled = gait_lift_scale(l, &scale, NULL);
+            for (int i = 0; i < 3 * TOY_SEGMENT; i++)
+                finite += x[i] - x[i] + (e[i] - e[i]);
+            CHECK(read != GAIT_OK || finite == 0.0);
+            CHECK(scaled != GAIT_OK || (scale > 0.0 && scale <= DBL_MAX));
+            refused += (read == GAIT_ERR_NUMERIC) + (scaled == GAIT_ERR_NUMERIC);
+            CHECK(found == GAIT_OK && gait_lift_fix(l, sds, NULL) == GAIT_OK);
+            CHECK(gait_lift_positions(l, x, e, NULL) == (k ? GAIT_ERR_NUMERIC : GAIT_OK));
+        }
+    CHECK(refused > 2);
+}
+
 /* Every call refuses missing arguments. */
 static void test_nothing(void)
 {
@@ -460,6 +495,7 @@ int main(void)
     test_scale();
     test_robust();
     test_expected_and_unknown();
+    test_absurd();
     test_nothing();
     test_an_older_config();
     test_arguments();

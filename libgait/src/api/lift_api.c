@@ -263,6 +263,14 @@ static gait_result need_segment(bool there, const char *function, gait_error *er
                              function);
 }
 
+static bool all_finite(const double *x, size_t count)
+{
+    bool ok = true;
+    for (size_t i = 0; i < count; i++)
+        ok &= fabs(x[i]) <= DBL_MAX;
+    return ok;
+}
+
 gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_error *err)
 {
     if (!l || !mean)
@@ -272,6 +280,8 @@ gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_err
         return s;
     for (int32_t f = 0; f < l->table.prior.frames; f++)
         read_frame(l, &l->posterior, f, true, mean, sd);
+    if (!all_finite(mean, 3 * points_of(&l->table)) || (sd && !all_finite(sd, 3 * points_of(&l->table))))
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_positions: the last segment is out of range");
     return GAIT_OK;
 }
 
@@ -394,6 +404,9 @@ gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out, gait_error *e
         return base_fail(err, GAIT_ERR_STATE, -1,
                          "gait_lift_estimate: no frame of %d frames ago; push more, or lower config lag",
                          (int)l->table.cfg.lag);
+    size_t const numbers = out->status == GAIT_TRACK_INIT ? 0 : 3 * (size_t)l->table.prior.markers;
+    if (!all_finite(out->marker[0], numbers) || !all_finite(out->sd[0], numbers))
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_estimate: observations are out of range");
     return GAIT_OK;
 }
 
