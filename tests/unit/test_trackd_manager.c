@@ -57,7 +57,7 @@ static void test_reports(const char *name)
     close(manager);
 }
 
-static void test_nobody_listens(void)
+static void test_no_manager(void)
 {
     char longest[200];
     memset(longest, 'x', sizeof longest);
@@ -68,7 +68,7 @@ static void test_nobody_listens(void)
     CHECK(setenv("NOTIFY_SOCKET", "relative", 1) == 0 && !manager_listens());
     manager_report("READY=1");
     CHECK(setenv("NOTIFY_SOCKET", longest, 1) == 0);
-    manager_report("READY=1"); /* no address has room for it */
+    manager_report("READY=1"); /* no address can hold it */
 }
 
 int main(void)
@@ -83,6 +83,6 @@ int main(void)
     unlink(name);
     *strrchr(name, '/') = '\0';
     rmdir(name);
-    test_nobody_listens();
+    test_no_manager();
     return CHECK_DONE();
 }

@@ -16,11 +16,11 @@ static struct layer {
     char channels[2048];   /* each with a space behind it */
     int ready[2], left[2]; /* of images and of others: result of lcm_handle_timeout(), for so many calls */
     int poll;              /* result of ppoll() */
-    int waits;             /* number of calls until the program is told to end */
+    int waits;             /* number of calls until the program shall end */
 } layer;
 
 static lcm_t *const CONNECTION[2] = {(lcm_t *)&layer.ready[0], (lcm_t *)&layer.ready[1]};
-static volatile sig_atomic_t told_to_end;
+static volatile sig_atomic_t ended;
 
 static lcm_t *layer_open(const char *url, message *why)
 {
@@ -63,7 +63,7 @@ static int layer_queue(lcm_subscription_t *s)
 
 static int layer_poll(struct pollfd *fd, nfds_t count, const struct timespec *wait, const sigset_t *mask)
 {
-    told_to_end = --layer.waits <= 0 || !fd || !count || !wait || !mask;
+    ended = --layer.waits <= 0 || !fd || !count || !wait || !mask;
     errno = layer.poll < 0 ? -layer.poll : 0;
     return layer.poll < 0 ? -1 : layer.poll;
 }
@@ -151,29 +151,29 @@ static bool run(bool log, struct layer how)
 {
     sigset_t none;
     sigemptyset(&none);
-    told_to_end = 0;
+    ended = 0;
     why.text[0] = '\0';
     layer = (struct layer){0};
     if (!receiver_open(&r, &s, &snapshot, log ? "file:///log" : "udpm://239.1.1.1:7667", &why))
         abort();
     layer = how;
-    bool const ok = receiver_run(&r, &told_to_end, &none, &why);
+    bool const ok = receiver_run(&r, &ended, &none, &why);
     receiver_close(&r);
     return ok;
 }
 
 static void test_run(void)
 {
-    CHECK(run(false, (struct layer){.waits = 3}) && told_to_end && layer.waits == 0);
-    CHECK(run(false, (struct layer){.waits = 3, .poll = -EINTR}) && told_to_end);
+    CHECK(run(false, (struct layer){.waits = 3}) && ended && layer.waits == 0);
+    CHECK(run(false, (struct layer){.waits = 3, .poll = -EINTR}) && ended);
     CHECK(!run(false, (struct layer){.waits = 3, .poll = -EBADF}) &&
           strstr(why.text, "cannot wait for messages"));
     CHECK(run(false, (struct layer){.waits = 2, .poll = 1, .ready = {1, 1}, .left = {9, 5}}));
     CHECK(layer.left[1] < 0 && layer.left[0] == 7); /* all others before one image */
     CHECK(!run(false, (struct layer){.waits = 3, .poll = 1, .ready = {-1, 0}, .left = {1, 0}}));
-    CHECK(strstr(why.text, "the LCM connection has failed") && !told_to_end);
+    CHECK(strstr(why.text, "the LCM connection has failed") && !ended);
     CHECK(!run(false, (struct layer){.waits = 3, .poll = 1, .ready = {0, -1}, .left = {0, 1}}));
-    CHECK(run(true, (struct layer){.waits = 3, .poll = 1, .ready = {-1, 0}, .left = {1, 0}}) && !told_to_end);
+    CHECK(run(true, (struct layer){.waits = 3, .poll = 1, .ready = {-1, 0}, .left = {1, 0}}) && !ended);
     out.log = (lcm_eventlog_t *)&layer; /* an output that has failed ends the program */
     out.failed = 1;
     message_set(&out.fault, "disk full");

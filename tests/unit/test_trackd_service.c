@@ -1,4 +1,4 @@
-/* The service without a transport: commands, frames, pauses, backgrounds, a moving camera, several people, and what it says
+/* The service without a transport: commands, frames, pauses, backgrounds, a moving camera, several people, and what is reported
  * about each. */
 #define _XOPEN_SOURCE 700 /* P_tmpdir */
 #include <stdlib.h>
@@ -264,14 +264,14 @@ static void test_background(void)
 /* ---- what is missing ---- */
 static void test_lack(void)
 {
-    gait_camera wide = CAMERA;
-    wide.width = 3 * WIDTH;
+    gait_camera large = CAMERA;
+    large.width = 3 * WIDTH;
     begin(NULL, &more, false);
     CHECK(lacks("no camera: give --camera or announce it on GAIT_CAMERA_0"));
-    announce(NULL, &wide, 1);
+    announce(NULL, &large, 1);
     CHECK(lacks("no usable camera: camera with 144x32 pixels"));
     s.idle = SERVICE_IDLE_CAMERA;
-    announce(NULL, &wide, 2);
+    announce(NULL, &large, 2);
     CHECK(s.idle == SERVICE_IDLE_CAMERA); /* nothing new */
     announce(NULL, &CAMERA, 3);
     CHECK(lacks("announce it on GAIT_CAMERA_1"));
@@ -363,7 +363,7 @@ static void test_people(void)
     end();
 }
 
-/* Whoever is nearest is seen in each pixel, in whichever order the bodies are given. */
+/* The nearest person is seen in each pixel, in whichever order the bodies are given. */
 static void test_nearest(void)
 {
     static uint8_t drawing[WIDTH * HEIGHT], one[WIDTH * HEIGHT], two[WIDTH * HEIGHT];
