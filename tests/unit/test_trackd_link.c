@@ -52,9 +52,9 @@ static int layer_dup(int file)
     return layer.no_dup ? -1 : dup(file);
 }
 
-static int layer_open(const char *path, int flags)
+static int layer_open(const char *path, int flags, ...)
 {
-    return layer.no_null ? -1 : open(path, flags);
+    return layer.no_null ? -1 : open(path, flags, 0600);
 }
 
 static int layer_fsync(int file)
@@ -209,7 +209,10 @@ static void test_log(void)
     CHECK(sink_close(&s, &why)); /* no output */
     CHECK(sink_open(&s, url, &why));
     sink_publish(&s, "A", 0, data, 9);
-    CHECK(!sink_ended(&s, &why) && sink_close(&s, &why) && log_scan(name, &why) == 1);
+    CHECK(!sink_ended(&s, &why));
+    sink another;
+    CHECK(!sink_open(&another, url, &why) && strstr(why.text, "another program is writing this log"));
+    CHECK(sink_close(&s, &why) && log_scan(name, &why) == 1);
     static const struct {
         int fault;
         bool fine;
