@@ -266,6 +266,99 @@ static void test_poor_fit(void)
         CHECK(toy_distance(out.marker[j], X[j]) < 0.1);
 }
 
+/* The person is found though most points of the first second are wrong. */
+static void test_clutter(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.lag = 0;
+    gait_lift *const l = toy_lift_open(&c);
+    uint32_t seed = 5;
+    double worst = 0.0;
+    for (int i = 0; i < STREAM; i++) {
+        see(&c, i, 1.0);
+        for (int j = 0; i < 30 && j < TOY_MARKERS; j++)
+            if (toy_random(&seed) < 0.6)
+                for (int a = 0; a < 2; a++)
+                    uv[2 * j + a] = 480.0 * toy_random(&seed);
+        CHECK(gait_lift_push(l, utime_of(i), uv, sds, NULL) == GAIT_OK);
+    }
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
+    CHECK(error_of(&out, &worst) < 0.05);
+}
+
+/* A heading that is known is not turned with the body. */
+static void test_known_heading(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.lag = 0;
+    c.heading = 0.3;
+    c.heading_sd = 0.0;
+    gait_lift *const l = toy_lift_open(&c);
+    double worst = 0.0;
+    for (int i = 0; i < STREAM; i++)
+        CHECK(push(l, &c, i, 1.0) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
+    CHECK(error_of(&out, &worst) < 0.05);
+    CHECK_NEAR(out.heading, 0.3, 1e-12);
+}
+
+/* Of two ways to walk, the one that the points show is followed, whichever comes first in the model. */
+static void test_second_component(void)
+{
+    static toy_segments kept;
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    double X[TOY_MARKERS][3];
+    kept = toy_lift_prior;
+    toy_lift_learn(2, 0);
+    for (int of = 0; of < 2; of++) {
+        gait_lift *const l = toy_lift_open(&c);
+        double const place[3] = {0.0, 0.0, 0.01};
+        static double segment[TOY_SEGMENT][3];
+        toy_draw(&toy_lift_prior, of, 21, 0.3, place, segment);
+        for (int i = 0; i < 60; i++) {
+            memcpy(X, segment[i / 3 % TOY_SEGMENT_FRAMES * TOY_MARKERS], sizeof X);
+            toy_lift_see(&c, (const double (*)[3])X, TOY_MARKERS, 0.5, (uint32_t)i, uv);
+            CHECK(gait_lift_push(l, utime_of(i), uv, NULL, NULL) == GAIT_OK);
+        }
+        CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status != GAIT_TRACK_INIT);
+    }
+    toy_lift_prior = kept;
+    toy_lift_load();
+}
+
+/* A point with an sd whose square is too small for a double, in any frame: where that is an error the stream begins anew, and
+ * the person is found again. */
+static void test_out_of_range(double tiny, double threshold)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.residual = 0.0;
+    c.lag = 0;
+    c.fit_threshold = threshold;
+    gait_lift *const l = toy_lift_open(&c);
+    int refused = 0;
+    double worst = 0.0;
+    for (int at = 0; at < 40; at++) {
+        gait_lift_reset(l);
+        for (int i = 0; i < 60; i++) {
+            see(&c, i, 1.0);
+            if (i == at)
+                for (int j = 0; j < TOY_MARKERS; j++)
+                    sds[j] = tiny;
+            gait_result const s = gait_lift_push(l, utime_of(i), uv, sds, NULL);
+            CHECK(s == GAIT_OK || s == GAIT_ERR_NUMERIC);
+            if (s == GAIT_OK)
+                continue;
+            refused++;
+            CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_ERR_STATE);
+        }
+    }
+    CHECK(refused > 0);
+    gait_lift_reset(l);
+    for (int i = 0; i < 60; i++)
+        CHECK(push(l, &c, i, 1.0) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && error_of(&out, &worst) < 0.1);
+}
+
 /* Hash of every estimate of the film. */
 static uint64_t digest(uint32_t mask)
 {
@@ -291,6 +384,11 @@ static void tests(void)
     test_order();
     test_report();
     test_poor_fit();
+    test_clutter();
+    test_known_heading();
+    test_second_component();
+    test_out_of_range(1e-200, 9.0);
+    test_out_of_range(1e-153, 0.0);
     test_noise();
     for (double off = 50.0; off < 1e31; off *= 10.0)
         test_wrong_points(off);
