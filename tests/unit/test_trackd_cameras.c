@@ -70,30 +70,39 @@ static void test_check(void)
 {
     static const struct {
         int32_t width, height;
-        float fx, fy;
+        float fx, fy, cx, cy;
         const char *reason;
     } bad[] = {
-        {0, 32, 50, 50, "size of 0x32"},
-        {48, 0, 50, 50, "size of 48x0"},
-        {GAIT_MAX_PIXELS + 1, 32, 50, 50, "send 1 to"},
-        {48, GAIT_MAX_PIXELS + 1, 50, 50, "send 1 to"},
-        {48, 33, 50, 50, "more than the 1536 that --max-pixels leaves"},
-        {48, 32, 0, 50, "focal lengths 0 and 50"},
-        {48, 32, 50, NAN, "focal lengths 50 and nan"},
+        {0, 32, 50, 50, 24, 16, "size of 0x32"},
+        {48, 0, 50, 50, 24, 16, "size of 48x0"},
+        {GAIT_MAX_PIXELS + 1, 32, 50, 50, 24, 16, "send 1 to"},
+        {48, GAIT_MAX_PIXELS + 1, 50, 50, 24, 16, "send 1 to"},
+        {48, 33, 50, 50, 24, 16, "more than the 1536 that --max-pixels leaves"},
+        {48, 32, 0, 50, 24, 16, "focal lengths 0 and 50"},
+        {48, 32, 50, NAN, 24, 16, "focal lengths 50 and nan"},
+        {48, 32, 50, 50, 3e38f, 16, "principal point (3e+38, 16) is not near the middle of 48x32 pixels"},
+        {48, 32, 50, 50, NAN, 16, "principal point"},
+        {48, 32, 50, 50, 24, -INFINITY, "principal point"},
+        {48, 32, 50, 50, 6.6f, 16, "principal point"},
+        {48, 32, 50, 50, 24, 26.8f, "principal point"},
     };
     message why;
     gait_camera c = CAMERA, out;
     CHECK(camera_check(&c, 48 * 32, &why));
+    c.cx = 6.8f, c.cy = 26.6f; /* 35 % off the middle */
+    CHECK(camera_check(&c, 48 * 32, &why));
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         c = CAMERA;
         c.width = bad[i].width, c.height = bad[i].height, c.fx = bad[i].fx, c.fy = bad[i].fy;
+        c.cx = bad[i].cx, c.cy = bad[i].cy;
         CHECK(!camera_check(&c, 48 * 32, &why) && strstr(why.text, bad[i].reason));
     }
     for (int i = 0; i < 9; i++) { /* another number anywhere, or a left-handed system */
         c = CAMERA;
         c.R[i] = c.R[i] == 0.0f ? 0.1f : -c.R[i];
         CHECK(!camera_check(&c, 48 * 32, &why) && strstr(why.text, "R is not a rotation"));
-        gaitmsg_camera_t const msg = {.width = 48, .height = 32, .fx = 50, .fy = 50, .R = {1, 2}};
+        gaitmsg_camera_t const msg = {
+            .width = 48, .height = 32, .fx = 50, .fy = 50, .cx = 24, .cy = 16, .R = {1, 2}};
         CHECK(!camera_from_message(&msg, 48 * 32, &out, &why) && strstr(why.text, "R is not a rotation"));
     }
 }

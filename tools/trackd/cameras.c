@@ -27,6 +27,16 @@ static bool check_rotation(const gait_camera *camera, const char *name, message 
                        name);
 }
 
+/* Whether the principal point is near the middle of the picture, as Python requires of every file. */
+static bool check_middle(const gait_camera *c, const char *name, message *why)
+{
+    float const most = 0.35f; /* offset in pictures */
+    float const x = (c->cx + 0.5f) / (float)c->width - 0.5f, y = (c->cy + 0.5f) / (float)c->height - 0.5f;
+    return (fabsf(x) <= most && fabsf(y) <= most) ||
+           message_set(why, "%s: principal point (%g, %g) is not near the middle of %dx%d pixels; %s", name,
+                       (double)c->cx, (double)c->cy, c->width, c->height, "give cx and cy for this size");
+}
+
 bool camera_plausible(const gait_camera *camera, const char *name, message *why)
 {
     gait_error err;
@@ -84,7 +94,7 @@ static bool parse_camera(const fields *f, gait_camera *c, message *why)
                       "give the translation from world to camera, 3 numbers in metres", why) ||
         !read_distortion(f, c->distortion, why))
         return false;
-    return check_rotation(c, f->path, why);
+    return check_middle(c, f->path, why) && check_rotation(c, f->path, why);
 }
 
 /* Kinds of file that `gait capture` reads and this program does not. */
@@ -136,7 +146,7 @@ bool camera_check(const gait_camera *c, int64_t max_pixels, message *why)
     if (!(c->fx > 0) || !(c->fy > 0))
         return message_set(why, "camera with focal lengths %g and %g; send pixels", (double)c->fx,
                            (double)c->fy);
-    return check_rotation(c, "camera", why);
+    return check_middle(c, "camera", why) && check_rotation(c, "camera", why);
 }
 
 bool camera_from_message(const gaitmsg_camera_t *in, int64_t max_pixels, gait_camera *out, message *why)
