@@ -603,11 +603,14 @@ format: setup ## format all code
 install: lib ## the library and, after `make tools`, the daemon as a service (DESTDIR= PREFIX= LIBDIR= INCLUDEDIR=)
 	@for d in '$(PREFIX)' '$(LIBDIR)' '$(INCLUDEDIR)'; do case "$$d" in /*) ;; *) echo "install: '$$d' does not begin with /:" \
 	    'give PREFIX, LIBDIR and INCLUDEDIR from the root' >&2; exit 1;; esac; done
-	install -d '$(DESTDIR)$(LIBDIR)/pkgconfig' '$(DESTDIR)$(LIBDIR)/cmake/gait' '$(DESTDIR)$(INCLUDEDIR)'
+	install -d '$(DESTDIR)$(LIBDIR)/pkgconfig' '$(DESTDIR)$(LIBDIR)/cmake/gait' '$(DESTDIR)$(INCLUDEDIR)' \
+	    '$(DESTDIR)$(PREFIX)/share/doc/libgait'
 	install -m 755 $(B)/libgait.so.$(ABI) '$(DESTDIR)$(LIBDIR)/'
 	ln -sf libgait.so.$(ABI) '$(DESTDIR)$(LIBDIR)/libgait.so'
 	install -m 644 $(B)/libgait.a '$(DESTDIR)$(LIBDIR)/'
 	install -m 644 $(HEADERS) '$(DESTDIR)$(INCLUDEDIR)/'
+	install -m 644 LICENSE README.md '$(DESTDIR)$(PREFIX)/share/doc/libgait/'
+	sed 's|](../../|](|g' libgait/doc/notices.md > '$(DESTDIR)$(PREFIX)/share/doc/libgait/notices.md'
 	for f in pkgconfig/gait.pc cmake/gait/gaitConfig.cmake cmake/gait/gaitConfigVersion.cmake; do \
 	    sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(VERSION)|' \
 	        -e "s|@INCLUDES@|$$(realpath -ms --relative-to='$(LIBDIR)/cmake/gait' '$(INCLUDEDIR)')|; s|@ABI@|$(ABI)|" \
@@ -623,12 +626,14 @@ $(MANUAL): tools/man.py $(wildcard python/gait/cli/*.py) $(PAGED) | $(READY) bui
 	$(PY) $< $(@D) $(VERSION) $(VENV)/bin/gait $(PAGED)
 	@touch $@
 
-# Its LCM, which no Debian package has, lies beside it in lib/gait.
+# Its LCM, which no Debian package has, lies beside it in lib/gait, its licence with the notices.
 install-daemon: tools $(MANUAL)
 	install -d '$(DESTDIR)$(PREFIX)/bin' '$(DESTDIR)$(PREFIX)/lib/gait' '$(DESTDIR)$(PREFIX)/lib/systemd/system' \
 	    '$(DESTDIR)$(PREFIX)/share/man/man1' '$(DESTDIR)$(PREFIX)/share/gait/lcm_types'
 	install -m 755 $(BIN)/gait-trackd '$(DESTDIR)$(PREFIX)/bin/'
 	install -m 755 $(LCM)/lib/liblcm.so.1 '$(DESTDIR)$(PREFIX)/lib/gait/'
+	install -m 644 $(firstword $(wildcard $(SITE)/lcm-*.dist-info/licenses/COPYING)) \
+	    '$(DESTDIR)$(PREFIX)/share/doc/libgait/lcm-COPYING'
 	install -m 644 $(LCM_TYPES) '$(DESTDIR)$(PREFIX)/share/gait/lcm_types/'
 	install -m 644 $(addprefix python/gait/data/,walk.gait paper.gait classes.gait) '$(DESTDIR)$(PREFIX)/share/gait/'
 	sed 's|/usr/local|$(PREFIX)|' tools/trackd/trackd.toml > '$(DESTDIR)$(PREFIX)/share/gait/trackd.toml'
@@ -639,6 +644,7 @@ install-daemon: tools $(MANUAL)
 uninstall: ## remove what install installed
 	cd '$(DESTDIR)$(LIBDIR)' && rm -rf libgait.so.$(ABI) libgait.so libgait.a pkgconfig/gait.pc cmake/gait
 	cd '$(DESTDIR)$(INCLUDEDIR)' && rm -f $(notdir $(HEADERS))
+	rm -rf '$(DESTDIR)$(PREFIX)/share/doc/libgait'
 	test ! -d '$(DESTDIR)$(PREFIX)/share/gait' || { cd '$(DESTDIR)$(PREFIX)' && rm -rf bin/gait-trackd lib/gait share/gait \
 	    lib/systemd/system/gait-trackd.service share/man/man1/gait.1 share/man/man1/gait-*.1; }
 

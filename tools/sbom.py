@@ -4,8 +4,8 @@
     sbom.py PACKAGES.json -o SBOM.json
 
 Adds the hashes of python/lock.txt, licences that packages do not declare, the shared libraries inside the
-packages, Eigen in the C library, and the files that `--fetch` downloads: the detector's weights and the parts
-of pages.  `make sbom` calls this.
+packages, Eigen in the C library, the system's libjpeg in the daemon, and the files that `--fetch` downloads:
+the detector's weights and the parts of pages.  `make sbom` calls this.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import argparse
 import hashlib
 import json
 import re
+import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError, files, version
 from pathlib import Path
@@ -62,8 +63,25 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
         "version": version("cmeel-eigen"),
         "description": "headers, compiled into libgait (libgait/src/base/linalg.cpp)",
         "licenses": [{"license": {"id": "MPL-2.0"}}],
+        "externalReferences": [release("cmeel-eigen", version("cmeel-eigen"), locked)],
     }
-    return document | {"components": [*packages, eigen, *map(fetched, LICENCES)]}
+    return document | {"components": [*packages, eigen, *system_jpeg(), *map(fetched, LICENCES)]}
+
+
+def system_jpeg() -> list[dict[str, Any]]:
+    """Describe the system's libjpeg, which gait-trackd links if it is there."""
+    try:
+        asked = subprocess.run(["pkg-config", "--modversion", "libjpeg"], capture_output=True, text=True)
+    except FileNotFoundError:
+        return []
+    found = {
+        "type": "library",
+        "name": "libjpeg",
+        "version": asked.stdout.strip(),
+        "description": "of the system, linked by gait-trackd",
+        "licenses": [{"expression": "IJG AND BSD-3-Clause"}],
+    }
+    return [found] if asked.returncode == 0 else []
 
 
 def hashes_of(lock: str) -> dict[tuple[str, str], list[str]]:
@@ -85,15 +103,20 @@ def described(package: dict[str, Any], locked: dict[tuple[str, str], list[str]])
     found = dict(package)
     if not found.get("licenses") and name in UNDECLARED:
         found["licenses"] = [{"license": {"id": UNDECLARED[name]}}]
-    if hashes := locked.get((name, number)):
-        files = {
-            "type": "distribution",
-            "url": f"pkg:pypi/{name}@{number}",
-            "comment": "the files of the release, of which one is installed",
-            "hashes": [{"alg": "SHA-256", "content": one} for one in hashes],
-        }
+    if (name, number) in locked:
+        files = release(name, number, locked)
         found["externalReferences"] = [*found.get("externalReferences", ()), files]
     return found
+
+
+def release(name: str, number: str, locked: dict[tuple[str, str], list[str]]) -> dict[str, Any]:
+    """Refer to the files of a release, with their hashes."""
+    return {
+        "type": "distribution",
+        "url": f"pkg:pypi/{name}@{number}",
+        "comment": "the files of the release, of which one is installed",
+        "hashes": [{"alg": "SHA-256", "content": one} for one in locked[name, number]],
+    }
 
 
 def fetched(file: Published) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A camera on the network: an RTSP server that sends H.264, and fails as it is told."""
+"""A camera on the network: an RTSP server that sends H.264, and fails on request."""
 
 from __future__ import annotations
 

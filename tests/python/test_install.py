@@ -45,9 +45,15 @@ def test_install_puts_everything_and_uninstall_removes_it(installed):
     daemon = {"bin/gait-trackd", "lib/gait/liblcm.so.1", "share/gait/walk.gait", "share/gait/trackd.toml"}
     daemon |= {"share/gait/paper.gait", "share/gait/classes.gait"}
     service = {"lib/systemd/system/gait-trackd.service"}
+    notices = {f"share/doc/libgait/{name}" for name in ("LICENSE", "README.md", "notices.md", "lcm-COPYING")}
     commands = ["gait", "gait-trackd", *(f"gait-{name.replace(' ', '-')}" for name in COMMANDS)]
     service |= {f"share/man/man1/{name}.1" for name in commands}
-    assert names == libraries | described | headers | types | daemon | service
+    assert names == libraries | described | headers | types | daemon | service | notices
+    told = (installed / "opt/gait/share/doc/libgait/notices.md").read_text()
+    for part in ("Eigen", "MPL-2.0", "LCM", "LGPL-2.1", "](README.md)"):
+        assert part in told
+    licence = (installed / "opt/gait/share/doc/libgait/lcm-COPYING").read_text()
+    assert "GNU LESSER GENERAL PUBLIC LICENSE" in licence.upper()
     assert make("uninstall", f"DESTDIR={installed}", "PREFIX=/opt/gait").returncode == 0
     assert not [p for p in installed.rglob("*") if not p.is_dir()]
 

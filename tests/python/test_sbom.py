@@ -2,6 +2,8 @@
 
 import importlib.util
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 from gait.detect import weights
@@ -31,5 +33,12 @@ def test_the_bill_has_what_is_compiled_in_inside_wheels_and_fetched():
     assert len(files) == entry.count("--hash") > 10
     assert all(f"--hash=sha256:{one['content']}" in entry for one in files)
     assert found["Eigen"]["licenses"] == [{"license": {"id": "MPL-2.0"}}]
+    assert found["Eigen"]["externalReferences"][0]["hashes"]
+    asked = (
+        subprocess.run(["pkg-config", "--exists", "libjpeg"], check=False)
+        if shutil.which("pkg-config")
+        else None
+    )
+    assert ("libjpeg" in found) == (asked is not None and asked.returncode == 0)
     for file in (*weights.STORE.files, *parts.STORE.files):
         assert found[file.file]["hashes"] == [{"alg": "SHA-256", "content": file.sha256}]
