@@ -6,6 +6,7 @@ import json
 import signal
 import socket
 import subprocess
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -476,20 +477,97 @@ def test_simultaneous_browsers_are_bounded(page, monkeypatch):
     assert asyncio.run(ask()) == [200, 200, 200, 503, 503]
 
 
-def test_connections_are_bounded(page):
-    address = "127.0.0.1", int(page.address.rstrip("/").rpartition(":")[2])
+HALF = b"GET /state HTTP/1.1\r\nHost: "
+
+
+def connected(page):
+    return socket.create_connection(("127.0.0.1", port_of(page)), timeout=rig.PATIENCE)
+
+
+def port_of(page):
+    return int(page.address.rstrip("/").rpartition(":")[2])
+
+
+def has_ended(connection):
+    """Wait until the server has ended a connection."""
+    try:
+        return connection.recv(1) == b""
+    except ConnectionResetError:
+        return True
+
+
+@pytest.mark.parametrize("sent", [b"", HALF])
+def test_half_sent_requests_shut_no_one_out(sent, page):
+    count = serve.MOST_CONNECTIONS + 2
     with contextlib.ExitStack() as stack:
-        for _ in range(serve.MOST_CONNECTIONS):
-            stack.enter_context(socket.create_connection(address))
-        with pytest.raises(urllib.error.HTTPError, match="503"):
-            get(page, "state")
-    deadline = time.monotonic() + rig.PATIENCE
-    while True:
-        try:
-            get(page, "state").close()
-            break
-        except urllib.error.HTTPError:
-            assert time.monotonic() < deadline
+        silent = [stack.enter_context(connected(page)) for _ in range(count)]
+        for one in silent[-serve.MOST_WAITING :]:
+            one.sendall(sent)
+        assert get(page, "state").status == 200
+        assert all(has_ended(one) for one in silent[: -serve.MOST_WAITING])
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [b"", HALF, b"POST /record?on=0 HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nContent-Length: 9\r\n\r\nhalf"],
+)
+def test_a_request_has_to_come_in_time(sent, page, monkeypatch):
+    monkeypatch.setattr(serve, "REQUEST_S", 0.1)
+    with connected(page) as one:
+        one.sendall(sent % port_of(page) if b"%d" in sent else sent)
+        while not has_ended(one):
+            pass
+    assert get(page, "state").status == 200
+
+
+def test_an_answer_has_to_be_read_in_time(monkeypatch):
+    monkeypatch.setattr(serve, "ANSWER_S", 0.1)
+    ended = threading.Event()
+
+    async def endless(scope, receive, send):
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": bytes(1 << 25), "more_body": True})
+        while (await receive())["type"] != "http.disconnect":
+            pass
+        ended.set()
+
+    own = serve.listen(0)
+    running, thread = serve.background(endless, own)
+    try:
+        with socket.create_connection(own.getsockname()) as one:
+            one.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
+            assert ended.wait(rig.PATIENCE)
+    finally:
+        running.should_exit = True
+        thread.join()
+
+
+def test_connections_are_bounded(monkeypatch):
+    monkeypatch.setattr(serve, "MOST_CONNECTIONS", 3)
+    begun, over = threading.Semaphore(0), threading.Event()
+
+    async def slow(scope, receive, send):
+        begun.release()
+        while not over.is_set():
+            await asyncio.sleep(0.01)
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    own = serve.listen(0)
+    running, thread = serve.background(slow, own)
+    try:
+        with contextlib.ExitStack() as stack:
+            for _ in range(2):
+                one = stack.enter_context(socket.create_connection(own.getsockname()))
+                one.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
+                assert begun.acquire(timeout=rig.PATIENCE)
+            with pytest.raises(urllib.error.HTTPError, match="503"):
+                urllib.request.urlopen(serve.address(own), timeout=rig.PATIENCE)
+            over.set()
+            assert one.recv(12) == b"HTTP/1.1 200"
+    finally:
+        running.should_exit = True
+        thread.join()
 
 
 def test_browsers_are_bounded_and_their_places_come_free(page, monkeypatch):

@@ -13,18 +13,23 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import h11
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from gait.errors import UserError
 from gait.web import modules
 
 HOST = "127.0.0.1"
 MOST_CONNECTIONS = 128  # of browsers, each of which opens up to six; further ones are refused
+MOST_WAITING = 64  # of these that have not sent a whole request; a further one ends the oldest
+REQUEST_S = 5.0  # seconds that a browser has to send a request
+ANSWER_S = 30.0  # seconds that it may leave an answer unread
 STREAMS_END = 3  # seconds that event streams have to end when the server does
 _NAMES = (HOST, "localhost", "[::1]")
 _POLICY = (
@@ -222,9 +227,63 @@ def _server(app: ASGIApp, ready: Callable[[], None]) -> uvicorn.Server:
         lifespan="off",
         timeout_graceful_shutdown=STREAMS_END,
         limit_concurrency=MOST_CONNECTIONS,
+        http=_Connection,
     )
     server = _Server(config, ready)
     return server
+
+
+class _Connection(H11Protocol):
+    """A connection that ends if it does not send a whole request, or does not read an answer, in time."""
+
+    _late: asyncio.TimerHandle | None = None  # runs while the rest of a request is expected
+    _unread: asyncio.TimerHandle | None = None  # runs while an answer waits
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._watch()
+        waiting = [one for one in self.connections if isinstance(one, _Connection) and one._late]
+        if len(waiting) > MOST_WAITING:
+            min(waiting, key=lambda one: one._late.when() if one._late else 0.0)._end()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._stop()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        self._watch()
+
+    def on_response_complete(self) -> None:
+        super().on_response_complete()
+        self._watch()
+
+    def _stop(self) -> None:
+        for timer in filter(None, (self._late, self._unread)):
+            timer.cancel()
+        self._late = self._unread = None
+
+    def _end(self) -> None:
+        self._stop()
+        self.connections.discard(self)
+        self.transport.abort()
+
+    def _watch(self) -> None:
+        owes = self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
+        if owes and not self._late:
+            self._late = self.loop.call_later(REQUEST_S, self._end)
+        elif self._late and not owes:
+            self._late.cancel()
+            self._late = None
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        self._unread = self.loop.call_later(ANSWER_S, self._end)
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        if self._unread:
+            self._unread.cancel()
 
 
 class _Server(uvicorn.Server):
