@@ -38,6 +38,7 @@ static void test_integers(void)
          "acquisition_particles"},
         {offsetof(gait_tracker_config, components), -2, GAIT_ERR_LIMIT, "components"},
         {offsetof(gait_tracker_config, components), TOY_COMPONENTS + 1, GAIT_ERR_LIMIT, "components"},
+        {offsetof(gait_tracker_config, proportions), GAIT_MAX_PROPORTIONS, GAIT_ERR_LIMIT, "proportions"},
         {offsetof(gait_tracker_config, tasks), 0, GAIT_ERR_LIMIT, "tasks"},
         {offsetof(gait_tracker_config, tasks), 257, GAIT_ERR_LIMIT, "tasks"},
         {offsetof(gait_tracker_config, cameras), 0, GAIT_ERR_LIMIT, "cameras"},

@@ -53,6 +53,7 @@ static void test_refused(void)
         {"SGRT", &toy.rate[0], 0, 1e-6},
         {"SGRT", &toy.rate[1], 0, -1},
         {"SGRT", &toy.rate[2], 0, NAN},
+        {"SGRT", &toy.rate[0], 0, 2000},
         {"SGWT", &toy.weight[0], 0, 0},
         {"SGWT", &toy.weight[0], 0, 0.9},
         {"SGMN", &toy.mean[0][5][1], 0, HUGE_VAL},
@@ -101,6 +102,9 @@ static void test_no_cyclic_model(void)
     gait_tracker_config cfg;
     gait_pose pose;
     gait_state state = {.stature = 1.8f}, sd;
+    gait_camera const camera = {4, 4, 5, 5, 2, 2, {1, 0, 0, 0, 0, -1, 0, 1, 0}, {0, 1, 5}, {0}};
+    uint8_t ids[16];
+    float height;
     size_t need = 0;
     toy_segments_fill(&toy, 1, 0);
     size_t const bytes = toy_segments_write(buf, &toy);
@@ -114,6 +118,9 @@ static void test_no_cyclic_model(void)
     CHECK(strstr(err.text, "without `--segments only`") != NULL);
     CHECK(gait_model_pose(m, &state, &pose, &err) == GAIT_ERR_ARG && strstr(err.text, "no cyclic part"));
     CHECK(gait_tracker_prior(m, &state, &sd, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_pelvis_height(m, &state, &height, &err) == GAIT_ERR_ARG && !gait_model_class_name(m, 0));
+    CHECK(gait_render(m, &camera, &state, ids, 4, &err) == GAIT_ERR_ARG &&
+          strstr(err.text, "no cyclic part"));
     toy_file f = toy_begin(buf, 0);
     CHECK(gait_model_bytes(buf, toy_finish(&f), &need, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "CHNM"));
 }

@@ -193,6 +193,13 @@ static void test_refused(void)
     refuse(h, 1, "hypothesis 0: probability");
     h.probability = NAN;
     refuse(h, 1, "probability");
+    h.probability = 1.5f;
+    refuse(h, 1, "probability");
+    CHECK(gait_tracker_start_hypotheses(NULL, &h, 1, 0, NULL) == GAIT_ERR_ARG);
+    gait_tracker_config const cfg = config();
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    CHECK(gait_tracker_start_hypotheses(t, NULL, 1, 0, NULL) == GAIT_ERR_ARG);
+    toy_tracker_free(t);
     h = truth(1.0f);
     refuse(h, 0, "count = 0 is outside [1, 8]");
     refuse(h, 9, "count = 9");

@@ -116,7 +116,7 @@ static gait_pool *layout(arena *a, int32_t threads)
 {
     gait_pool *const p = TAKE(a, gait_pool, 1);
     pthread_t *const thread = TAKE(a, pthread_t, threads);
-    if (p && !a->overflow)
+    if (p)
         *p = (gait_pool){.thread = thread};
     return p;
 }

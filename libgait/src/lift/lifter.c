@@ -30,7 +30,7 @@ gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_c
         lift_gain_layout(a, t, &l.gain);
     if (cfg->lag >= 0)
         lift_stream_layout(a, t, &l.stream);
-    if (!self || a->overflow)
+    if (!self)
         return NULL;
     projection_init(&t->projection, cfg);
     t->run = run;

@@ -356,7 +356,7 @@ gait_model *model_layout(arena *a, const gait_model *m)
     float *curve[GAIT_MAX_CLASSES];
     for (int32_t k = 0; k < m->classes; k++)
         curve[k] = m[k].pace_terms ? TAKE(a, float, m[k].phases *m[k].channels) : NULL;
-    if (!self || a->overflow)
+    if (!self)
         return NULL;
     memcpy(self, m, (size_t)m->classes * sizeof *self);
     for (int32_t k = 0; k < m->classes; k++) {

@@ -48,7 +48,7 @@ gait_start *start_layout(arena *a, const gait_model *m, const gait_start_config 
     start_scratch *const scratch = TAKE(a, start_scratch, 1);
     start_people *const people = TAKE(a, start_people, 1);
     blob_finder const blobs = blob_finder_layout(a, cfg->camera.width, cfg->camera.height);
-    if (!s || a->overflow)
+    if (!s)
         return NULL;
     gait_tracker_config const plain = {.components = i_min(START_SCORES, m->components)};
     *s = (gait_start){.model = m,

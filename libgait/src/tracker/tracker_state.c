@@ -198,7 +198,7 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
     layout_state(a, &t);
     a->solid = false;
     layout_work(a, &t);
-    if (!self || a->overflow)
+    if (!self)
         return NULL;
     like_setup_init(t.like, m, &t.cfg, run);
     for (int32_t c = 0; c < m->classes; c++) {

@@ -181,7 +181,7 @@ struct gait_tracker {
     lag_scratch lag; /* ancestor and weight: in the memory of work[1] and later; without a lag NULL */
 };
 
-/* Place a tracker in memory; NULL if the arena only counts or overflows.  run: the kernels to use; NULL: when counting. */
+/* Place a tracker in memory; NULL if the arena only counts.  run: the kernels to use; NULL: when counting. */
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg,
                              const kernels *run);
 void tracker_clear(gait_tracker *t);
