@@ -180,6 +180,11 @@ static void describe_fit(const gait_lift *l, const lift_outcome *found, gait_lif
         out->place[i] = b->place[i] + t->cfg.place_sd[i] * b->theta[t->prior.modes + i];
 }
 
+static gait_result out_of_range(const char *function, const char *what, gait_error *err)
+{
+    return base_fail(err, GAIT_ERR_NUMERIC, -1, "%s: %s out of range", function, what);
+}
+
 gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                               gait_error *err)
 {
@@ -191,7 +196,7 @@ gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, 
     memcpy(l->posterior.place, t->cfg.place, sizeof t->cfg.place);
     l->fitted = l->windowed = lift_fit(t, &l->search, &l->window, &l->posterior, &found);
     if (!l->fitted)
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_segment: an observation is out of range");
+        return out_of_range("gait_lift_segment", "an observation is", err);
     describe_fit(l, &found, out);
     return GAIT_OK;
 }
@@ -209,8 +214,7 @@ gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, const doubl
     l->fitted = l->windowed =
         lift_fit_robust(t, &l->search, &l->window, &l->robust, &l->posterior, &found, &outliers);
     if (!l->fitted)
-        return base_fail(err, GAIT_ERR_NUMERIC, -1,
-                         "gait_lift_segment_robust: an observation is out of range");
+        return out_of_range("gait_lift_segment_robust", "an observation is", err);
     memcpy(weighted, l->sd, points_of(t) * sizeof *weighted);
     describe_fit(l, &found, out);
     return GAIT_OK;
@@ -263,14 +267,6 @@ static gait_result need_segment(bool there, const char *function, gait_error *er
                              function);
 }
 
-static bool all_finite(const double *x, size_t count)
-{
-    bool ok = true;
-    for (size_t i = 0; i < count; i++)
-        ok &= fabs(x[i]) <= DBL_MAX;
-    return ok;
-}
-
 gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_error *err)
 {
     if (!l || !mean)
@@ -278,11 +274,12 @@ gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_err
     gait_result const s = need_segment(l->fitted, "gait_lift_positions", err);
     if (s != GAIT_OK)
         return s;
+    bool finite = true;
     for (int32_t f = 0; f < l->table.prior.frames; f++)
         read_frame(l, &l->posterior, f, true, mean, sd);
-    if (!all_finite(mean, 3 * points_of(&l->table)) || (sd && !all_finite(sd, 3 * points_of(&l->table))))
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_positions: the last segment is out of range");
-    return GAIT_OK;
+    for (size_t i = 0; i < 3 * points_of(&l->table); i++)
+        finite &= fabs(mean[i]) <= DBL_MAX && (!sd || fabs(sd[i]) <= DBL_MAX);
+    return finite ? GAIT_OK : out_of_range("gait_lift_positions", "the last segment is", err);
 }
 
 int32_t gait_lift_unknowns(const gait_lift *l)
@@ -312,7 +309,7 @@ gait_result gait_lift_scale(gait_lift *l, double *scale, gait_error *err)
         return s;
     double const found = lift_scale(&l->table, &l->posterior, &l->spare);
     if (!(found > 0.0 && found <= DBL_MAX))
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_scale: the last segment is out of range");
+        return out_of_range("gait_lift_scale", "the last segment is", err);
     *scale = sqrt(found);
     return GAIT_OK;
 }
@@ -357,7 +354,7 @@ gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err)
     l->windowed = false;
     l->fitted = lift_gain_fix(t, &l->gain, &l->posterior, sd);
     if (!l->fitted)
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_fix: standard deviations are out of range");
+        return out_of_range("gait_lift_fix", "standard deviations are", err);
     memcpy(l->uv, l->gain.base, points_of(t) * 2 * sizeof *l->uv);
     memcpy(l->sd, sd, points_of(t) * sizeof *l->sd);
     return GAIT_OK;
@@ -392,7 +389,7 @@ gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const 
     lift_observations const observed = {.uv = l->stream.new_uv, .sd = l->stream.new_sd};
     lifter_take(l, (size_t)t->prior.markers, uv, sd, l->stream.new_uv, l->stream.new_sd);
     if (!lift_stream_push(t, &l->search, &l->stream, utime, &observed))
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_push: observations are out of range");
+        return out_of_range("gait_lift_push", "observations are", err);
     return GAIT_OK;
 }
 
