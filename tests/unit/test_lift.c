@@ -219,7 +219,7 @@ static void test_uncertain(void)
         for (int m = 0; m < 2; m++) {
             double largest = 0.0;
             for (int i = 0; i < 3 * TOY_SEGMENT; i++)
-                largest = fabs(mode[m][0][i]) > fabs(largest) ? mode[m][0][i] : largest;
+                largest = fabs(mode[m][i / 3][i % 3]) > fabs(largest) ? mode[m][i / 3][i % 3] : largest;
             CHECK(largest > 0.0);
         }
     }
