@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gait.camera.board import Board, Grey, blur, other_board
 from gait.camera.camera import Camera
+from gait.counts import count_of
 from gait.errors import UserError
 from gait.io.files import require_file
 from gait.io.video import Video
@@ -183,10 +184,9 @@ def _too_few(
             f"the board is blurred in {blurred} of {sharp + blurred} pictures; move it slowly, in good "
             "light, and stop at each pose"
         )
-    poses = f"{different} pose{'s' if different != 1 else ''}"
     return (
-        f"the board is seen sharply in {poses}, {FEWEST_POSES} are needed; show it in 10 or more: in every "
-        "corner of the picture, tilted to all sides, near and far"
+        f"the board is seen sharply in {count_of(different, 'pose')}, {FEWEST_POSES} are needed; "
+        "show it in 10 or more: in every corner of the picture, tilted to all sides, near and far"
     )
 
 

@@ -36,6 +36,7 @@ from typing import TYPE_CHECKING, Any
 
 from gait.bindings.abi import MAX_CAMERAS
 from gait.cli import values
+from gait.counts import count_of
 from gait.errors import UsageError, UserError
 from gait.io.files import replacing, require_outputs
 from gait.lift.smooth.options import METHODS, Options
@@ -546,9 +547,8 @@ def _check(args: argparse.Namespace, video: bool) -> None:
 
 def _text(s: dict[str, Any]) -> str:
     markers, count = s["markers"], len(s["markers"]["visible"])
-    points = f"{count} point{'s' if count != 1 else ''}"
     lines = [
-        f"{s['frames']} frames; {points} a frame, visible in {s['visible_share']:.0%}; "
+        f"{s['frames']} frames; {count_of(count, 'point')} a frame, visible in {s['visible_share']:.0%}; "
         f"{len(markers['estimated'])} markers estimated",
         f"{s['reprojection_px']:.2f} px from the keypoints, median sd {s['sd_mm']:.0f} mm"
         + (f", stature {s['stature_m']:.2f} m" if s["stature_m"] else ""),

@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.counts import count_of
 from gait.detect import profile
 from gait.detect.networks import LANDMARK_JOINTS, Crop, LandmarkNetwork, Person, PersonNetwork, whole_picture
 from gait.errors import UserError
@@ -397,7 +398,7 @@ def require_length(video: Video, frames: range) -> None:
     """Raise UserError for a picture, or if too few frames of a video are used to find people."""
     if len(frames) >= _LEAST_FRAMES:
         return
-    few = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
+    few = count_of(len(frames), "frame")
     if len(frames) < video.count:
         of = f"only {few} of {video.count} left, from {frames.start} on"
         raise UserError(f"{video.path}: {of}; give at least a second by --start and --stop")

@@ -12,6 +12,7 @@ import numpy as np
 from gait.bindings.segment_prior import SegmentPrior
 from gait.bindings.state import state_range
 from gait.camera.camera import Camera
+from gait.counts import count_of
 from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.detections import Clip
@@ -135,10 +136,9 @@ def load_prior(model: str | None, warn: Warn) -> SegmentPrior:
     """Load the prior of a model (None: the shipped one); warn if it was learnt from few recordings."""
     prior = SegmentPrior.load(model)
     if 0 < prior.recordings < FEW_RECORDINGS:
-        count = "one recording" if prior.recordings == 1 else f"{prior.recordings} recordings"
         warn(
-            f"{model}: learnt from {count}, too few to learn how people differ: standard deviations may be "
-            "too small; learn it from more"
+            f"{model}: learnt from {count_of(prior.recordings, 'recording')}, too few to learn how people "
+            "differ: standard deviations may be too small; learn it from more"
         )
     return prior
 

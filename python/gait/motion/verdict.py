@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gait.counts import count_of
 from gait.io.track_file import STATUSES, Track
 from gait.motion.parameters import Parameters, measured
 
@@ -163,8 +164,3 @@ def _speed(track: Track) -> tuple[float | None, bool]:
     moved = way / float(time[knots[-1]] - time[knots[0]])
     in_place = moved < _LEAST_SPEED_SHARE * of_strides
     return (of_strides if in_place else moved), in_place
-
-
-def count_of(count: int, what: str) -> str:
-    """Return a count with its noun, in the plural if needed."""
-    return f"{count} {what}{'' if count == 1 else 's'}"

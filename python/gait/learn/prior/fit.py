@@ -19,6 +19,7 @@ from gait.body.skeleton import (
     default_skeleton,
     points,
 )
+from gait.counts import count_of
 from gait.errors import UserError
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, release, stored
 from gait.learn.cycles import align, cutting
@@ -240,12 +241,12 @@ def most_components(cycles: int, wanted: int | str | None, files: list[str] | No
             min(rank.MOST_TRIED_COMPONENTS if wanted == "auto" else DEFAULT_COMPONENTS, allowed),
         )
     if allowed < least:
-        what = "1 component" if least == 1 else f"{least} components"
         more = f" or ask for {allowed} at most" if allowed >= 1 else ", 3 cycles at least"
         named = " ".join((files or [])[:MOST_NAMED_FILES]) + (
             " ..." if len(files or []) > MOST_NAMED_FILES else ""
         )
-        held = "1 cycle is" if cycles == 1 else f"{cycles} cycles are"
+        held = f"{count_of(cycles, 'cycle')} {'is' if cycles == 1 else 'are'}"
+        what = count_of(least, "component")
         raise UserError(f"{named}{': ' * bool(named)}{held} too few for {what}; add recordings{more}")
     return wanted
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import ANGLES
+from gait.counts import count_of
 from gait.errors import UserError
 from gait.io import blob
 from gait.learn.arrays import Floats
@@ -95,13 +96,13 @@ def text(path: str, s: dict[str, Any]) -> str:
     if "sequences" not in s:
         return f"{segment_summary.text(s['segments'])}\n{written}"
     explained = " ".join(f"{100 * v:.0f}" for v in s["variance_explained"])
-    left = f"; {_count(len(s['left_out']), 'file')} left out" if s["left_out"] else ""
+    left = f"; {count_of(len(s['left_out']), 'file')} left out" if s["left_out"] else ""
     lines = [
-        f"{_count(len(s['sequences']), 'sequence')} of {_count(len(s['subjects']), 'subject')} "
+        f"{count_of(len(s['sequences']), 'sequence')} of {count_of(len(s['subjects']), 'subject')} "
         f"({_listed(s['subjects'])}), "
-        f"{_count(s['cycles'], 'cycle')}{left}",
+        f"{count_of(s['cycles'], 'cycle')}{left}",
         f"{s['stride_hz'][0]:.2f} strides/s, stride length {s['stride_length_statures'][0]:.2f} statures",
-        f"{_count(s['components'], 'component')}: {explained} % of the variance; "
+        f"{count_of(s['components'], 'component')}: {explained} % of the variance; "
         f"residual {s['residual_deg']:.1f} deg",
         *_left_out(s.get("by_subject", [])),
         *([segment_summary.text(s["segments"])] if s["segments"] else []),
@@ -124,7 +125,7 @@ def notes(learned: Learned, options: LearnOptions) -> Iterator[str]:
     cycles, kept = len(learned.components.scores), len(learned.components.sd)
     usual = PAPER_COMPONENTS if learned.paper else DEFAULT_COMPONENTS
     if options.components is None and kept < usual:
-        yield f"{cycles} cycles allow {_count(kept, 'component')} instead of {usual}"
+        yield f"{cycles} cycles allow {count_of(kept, 'component')} instead of {usual}"
     if parts := model.unobserved(learned):
         yield f"no recording shows {_words(parts)}: they stay in the rest pose"
     if not learned.alignment.converged:
@@ -165,7 +166,3 @@ def _words(names: list[str]) -> str:
 def _listed(names: list[str]) -> str:
     """Join the first few names."""
     return " ".join(names[:MOST_NAMED_SUBJECTS]) + (" ..." if len(names) > MOST_NAMED_SUBJECTS else "")
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gait.bindings.segment_prior import SegmentPrior
+from gait.counts import count_of
 
 VARIANCE_SHARE = 0.91  # of the variance, as in the paper's figure 3
 
@@ -41,10 +42,9 @@ def text(s: dict[str, Any]) -> str:
     """Format the figures in one line."""
     turned = "" if not s["headings"] else f", {s['headings']} headings"
     mixed = "" if s["components"] == 1 else f", {s['components']} Gaussians"
-    several = "s" if s["recordings"] != 1 else ""
     return (
         f"segment prior: {s['segments']} segments of {s['frames']} frames at {s['fps']:g}/s from "
-        f"{s['recordings']} recording{several}, {len(s['markers'])} markers{turned}{mixed}; "
+        f"{count_of(s['recordings'], 'recording')}, {len(s['markers'])} markers{turned}{mixed}; "
         f"{s['modes']} modes explain {100 * s['variance_explained']:.1f} % of the variance, "
         f"gamma {s['gamma']:.2f}"
     )
