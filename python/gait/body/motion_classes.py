@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,8 +20,7 @@ def class_names(sections: Mapping[str, Any]) -> list[str]:
 def first_class(sections: Mapping[str, Any]) -> str:
     """Return the name of a model's first class of motion, also if it has no sections of classes."""
     names = class_names(sections)
-    meta = json.loads(sections["META"].tobytes()) if "META" in sections else {}
-    return names[0] if names else str(meta.get("activity", "walk"))
+    return names[0] if names else str(blob.read_meta(sections).get("activity", "walk"))
 
 
 def of_class(tag: str) -> bool:

@@ -7,6 +7,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from gait.counts import count_of
+
 GAIT_KEYS = (
     "stride_hz", "stride_hz_sd", "stride_time_cv", "stride_length", "stride_length_sd", "fps", "stature_m",
     "stature_sd_m",
@@ -47,7 +49,6 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
     from gait.bindings.segment_prior import TAGS, SegmentPrior
     from gait.body.model_curves import slope_of
     from gait.io import blob
-    from gait.io.fields import json_of
     from gait.learn.report import classes
     from gait.learn.segments import summary as segment_summary
 
@@ -69,8 +70,7 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
     if "SCST" in sections:
         result["scores"] = np.round(sections["SCST"].astype(float), 4).tolist()
     if "META" in sections:
-        text, remedy = sections["META"].tobytes(), "learn the model again"
-        result["meta"] = json_of(f"{name}: section META", text, remedy, remedy)
+        result["meta"] = blob.read_meta(sections, name)
     if found := classes.figures(sections):
         result["classes"] = found
     if any(tag in sections for tag in TAGS):
@@ -81,7 +81,6 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
 def text(name: str, s: Mapping[str, Any]) -> str:
     """Format the figures for people."""
     from gait.learn.segments import summary as segment_summary
-    from gait.motion.verdict import count_of
 
     meta, gait = s.get("meta", {}), s.get("gait", {})
     lines = [f"{name}: {s['bytes']} bytes, checksum {s['crc32']}"]
@@ -122,7 +121,6 @@ def text(name: str, s: Mapping[str, Any]) -> str:
 def _class_line(one: Mapping[str, Any]) -> str:
     """One class in words."""
     from gait.learn.report.classes import words
-    from gait.motion.verdict import count_of
 
     cells = words(one)
     source = f"of {cells['from']}" if one["recordings"] and one["curves_of"] == one["name"] else cells["from"]

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
+from gait.io.fields import json_of
 from gait.io.files import replacing
 
 MAGIC = b"GAITMDL\n"
@@ -117,6 +118,14 @@ def pack_names(names: list[str]) -> npt.NDArray[np.uint8]:
 def unpack_names(rows: Array) -> list[str]:
     """Decode the names of a section, the inverse of `pack_names`."""
     return [row.tobytes().split(b"\0")[0].decode(errors="backslashreplace") for row in rows]
+
+
+def read_meta(sections: Mapping[str, Array], name: str = "model") -> dict[str, Any]:
+    """Decode META; empty if a model has none. UserError, naming `name`, if it is not a JSON object."""
+    if "META" not in sections:
+        return {}
+    remedy = "learn the model again"
+    return json_of(f"{name}: section META", np.asarray(sections["META"]).tobytes(), remedy, remedy)
 
 
 def _aligned(n: int) -> int:

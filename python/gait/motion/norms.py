@@ -8,7 +8,6 @@ a track.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -21,7 +20,7 @@ from gait.body.model_curves import curves
 from gait.body.motion_classes import first_class
 from gait.body.skeleton import points
 from gait.errors import UserError
-from gait.io.blob import unpack_names
+from gait.io.blob import read_meta, unpack_names
 from gait.io.track_file import Joints, Track
 from gait.motion.footfalls import STRIKE_SIDES, find_events
 from gait.motion.parameters import (
@@ -199,8 +198,7 @@ def people(model: Mapping[str, Any], rate: float, stature: float) -> dict[str, t
 
 def _sides_alike(model: Mapping[str, Any]) -> float:
     """Correlation of the lasting angles of left and right leg among the people of a model."""
-    meta = json.loads(model["META"].tobytes()) if "META" in model else {}
-    return float(np.clip(meta.get("sides_alike", _SIDES_ALIKE), 0.0, 1.0))
+    return float(np.clip(read_meta(model).get("sides_alike", _SIDES_ALIKE), 0.0, 1.0))
 
 
 def _walk(

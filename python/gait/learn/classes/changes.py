@@ -236,7 +236,7 @@ def _concentration(length: float) -> float:
 
 def with_numbers_of(sections: Sections, names: Collection[str]) -> Sections:
     """Return a model's sections with the numbers of changes between these classes only."""
-    meta = model.read_meta(sections)
+    meta = blob.read_meta(sections)
     if "changes" not in meta:
         return sections
     kept = {
@@ -264,7 +264,7 @@ def with_changes(sections: Sections, observed: Observed) -> dict[str, blob.Array
             )
             changes[i, j] = one.rate, one.concentration, one.phase, one.slope
     names = blob.unpack_names(sections["CLNM"])
-    meta = model.read_meta(sections)
+    meta = blob.read_meta(sections)
     counts = [
         {to: int(n) for to, n, rate in zip(names, row, rates, strict=True) if n or rate}
         for row, rates in zip(observed.counts, changes[:, :, 0], strict=True)

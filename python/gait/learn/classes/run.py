@@ -93,7 +93,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
             note(f"{options.sources[0]}: keeps its classes {' '.join(others)}")
         every = [replace(one, changes=_changes(one, names, kept)) for one in classes.values()]
         credited = model.with_credits(
-            walk, [{"credits": options.credit}, *(model.read_meta(one.own or {}) for one in every)]
+            walk, [{"credits": options.credit}, *(blob.read_meta(one.own or {}) for one in every)]
         )
         joined = join(changes.with_numbers_of(credited, kept), every)
         return changes.with_changes(joined, _observed(joined, options, note)) if options.changes else joined
@@ -249,7 +249,7 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> tuple[
 
 def _counted(one: MotionClass, own: Mapping[str, blob.Array]) -> MotionClass:
     """Return a class with the numbers of cycles and recordings in the META of its model."""
-    meta = model.read_meta(own)
+    meta = blob.read_meta(own)
     recordings = meta.get("sequences", {}).get("count", 0)
     return replace(one, cycles=int(meta.get("cycles", 0)), recordings=int(recordings))
 

@@ -69,19 +69,13 @@ def origin(options: LearnOptions, sources: Iterable[Path]) -> dict[str, Any]:
 
 def with_credits(sections: Mapping[str, blob.Array], others: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """Return a model's sections with the credits of other models too, whose METAs are given."""
-    own = read_meta(sections)
+    own = blob.read_meta(sections)
     credits = dict.fromkeys(own.get("credits", []))
     for meta in others:
         credits |= dict.fromkeys(meta.get("credits", []))
         own |= {key: meta[key] for key in ("acknowledgement",) if key in meta}
     own |= {"credits": list(credits)} if credits else {}
     return {**sections, **({"META": meta_section(own)} if own else {})}
-
-
-def read_meta(sections: Mapping[str, blob.Array]) -> dict[str, Any]:
-    """Decode META; empty if a model has none."""
-    meta: dict[str, Any] = json.loads(np.asarray(sections["META"]).tobytes()) if "META" in sections else {}
-    return meta
 
 
 def shortened(name: str) -> str:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
 from gait.body.motion_classes import class_names, class_sections
+from gait.counts import count_of
 from gait.io import blob
 
 
@@ -14,8 +14,7 @@ def figures(sections: Mapping[str, blob.Array]) -> list[dict[str, Any]]:
     """Return for each class its rate, speed and how often people change from it; empty without classes."""
     if not (names := class_names(sections)):
         return []
-    meta = json.loads(sections["META"].tobytes()) if "META" in sections else {}
-    found, observed = [], meta.get("changes", {})
+    found, observed = [], blob.read_meta(sections).get("changes", {})
     for k, (name, row, change) in enumerate(zip(names, sections["CLIN"], sections["CLSW"], strict=True)):
         direction, source, cycles, recordings = (int(value) for value in row)
         own = class_sections(sections, k)
@@ -41,7 +40,7 @@ def words(one: Mapping[str, Any]) -> dict[str, str]:
     if one["cycles"]:
         source = f"{one['cycles']} cycles"
     elif one["recordings"]:
-        source = f"{one['recordings']} recording{'s' * (one['recordings'] > 1)} of people who stand"
+        source = f"{count_of(one['recordings'], 'recording')} of people who stand"
     if one["curves_of"] != one["name"]:
         source = f"the curves of {one['curves_of']} in reverse"
     moves = one["direction"] != 0
@@ -60,4 +59,4 @@ def words(one: Mapping[str, Any]) -> dict[str, str]:
 
 def _observed(count: int | None) -> str:
     """How many changes a rate was learnt from; None: it was not."""
-    return "prior" if count is None else f"{count} change{'s' * (count != 1)}"
+    return "prior" if count is None else count_of(count, "change")
