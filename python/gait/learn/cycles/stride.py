@@ -80,18 +80,25 @@ def step_repeats(angles: Floats, frames: float) -> float:
     """Return the correlation of each side with the other side half a period later; NaN without overlap."""
     columns = [[ANGLES.index(f"{s}_{name}") for name in PAIRED] for s in SIDES]
     left, right = (angles[:, k] - column_means(angles[:, k]) for k in columns)
-    time = np.arange(max(0, int(np.ceil(len(angles) - 1 - frames / 2))))
-    at = time + frames / 2
+    pairs = [with_later(*sides, frames / 2) for sides in ((left, right), (right, left))]
+    return correlation(*(np.concatenate(each) for each in zip(*pairs, strict=True)))
+
+
+def with_later(one: Floats, other: Floats, frames: float) -> tuple[Floats, Floats]:
+    """Return values of `one` and, `frames` later, of `other`, both (T, M), where both are visible (k,)."""
+    time = np.arange(max(0, int(np.ceil(len(one) - 1 - frames))))
+    at = time + frames
     low = at.astype(int)
     share = (at - low)[:, None]
-    product, squares = 0.0, np.zeros(2)
-    for one, other in ((left, right), (right, left)):
-        later = other[low] * (1 - share) + other[np.minimum(low + 1, len(other) - 1)] * share
-        both = np.isfinite(one[time] + later)
-        product += float(one[time][both] @ later[both])
-        squares += [np.sum(one[time][both] ** 2), np.sum(later[both] ** 2)]
-    scale = float(np.sqrt(np.prod(squares)))
-    return product / scale if scale > 0 else float("nan")
+    later = other[low] * (1 - share) + other[np.minimum(low + 1, len(other) - 1)] * share
+    both = np.isfinite(one[time] + later)
+    return one[time][both], later[both]
+
+
+def correlation(a: Floats, b: Floats) -> float:
+    """Return the correlation of values (k,) whose means are 0; NaN if either is always 0."""
+    scale = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / scale if scale > 0 else float("nan")
 
 
 def _sums_and_differences(angles: Floats) -> list[tuple[Floats, tuple[int, ...]]]:

@@ -168,16 +168,8 @@ def repeats(angles: Floats, period: float) -> float:
     Thus each cycle is predicted by another.  Unlike the ratio that chooses the period, this is not inflated
     by the choice among many means.
     """
-    time = np.arange(max(0, int(np.ceil(len(angles) - 1 - period))))
-    at = time + period
-    low = at.astype(int)
-    share = (at - low)[:, None]
     moved = angles - column_means(angles)
-    later = moved[low] * (1 - share) + moved[np.minimum(low + 1, len(moved) - 1)] * share
-    both = np.isfinite(moved[time] + later)
-    a, b = moved[time][both], later[both]
-    scale = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b) / scale if scale > 0 else float("nan")
+    return stride.correlation(*stride.with_later(moved, moved, period))
 
 
 def legs(angles: Floats, period: float) -> float:
