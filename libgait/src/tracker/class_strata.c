@@ -112,13 +112,25 @@ static void change_probability(const gait_tracker *t, const gait_model *m, int32
     to[(size_t)m->motion_class * n + (size_t)i] = stay;
 }
 
+/* What resampling needs, in t->rows. */
+typedef struct resampling_scratch {
+    double *weight; /* of every particle in one class */
+    float *to;      /* to[class][particle]: probability of being in each class afterwards */
+} resampling_scratch;
+
+static resampling_scratch scratch_in(float *rows, size_t particles)
+{
+    return (resampling_scratch){.weight = (double *)(void *)rows, .to = rows + 2 * particles};
+}
+
 void class_strata_resample(gait_tracker *t, int32_t begin, int32_t end, int32_t n, uint32_t u)
 {
     const strata *const then = tracker_strata(t);
     pf *const f = &t->filter;
     size_t const all = (size_t)f->n;
-    double *const weight = (double *)(void *)t->rows, total[GAIT_MAX_CLASSES]; /* f->n */
-    float *const to = t->rows + 2 * all;                                       /* classes x f->n */
+    resampling_scratch const scratch = scratch_in(t->rows, all);
+    double *const weight = scratch.weight, total[GAIT_MAX_CLASSES];
+    float *const to = scratch.to;
     float const seconds = seconds_since(t, t->core->start_utime + t->classes->resampled);
     double now[GAIT_MAX_CLASSES] = {0.0};
     for (int32_t k = 0; k < then->count; k++) {
