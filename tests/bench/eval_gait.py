@@ -96,7 +96,7 @@ PUBLISHED: tuple[tuple[Any, ...], ...] = (
     ("", "", "speed, m/s", "0.10", ("mean:speed_m_s",), 1.0),
     ("", "", "hip, knee, degrees", "4.0, 5.6", ("hip_flexion", "knee_angle"), 1.0),
     ("Gilon 2026, OpenCap Monocular", "1 view", "angles (hip, knee, ankle here), degrees", "4.8", _LEG, 1.0),
-    ("", "", "place of the pelvis, mm", "34", (), 1.0),
+    ("", "", "place of the pelvis, mm", "34", ("pelvis",), 1.0),
     (
         "Peiffer 2025, Portable Biomechanics Laboratory",
         "1 view",
@@ -135,6 +135,7 @@ class Run:
     #: degrees by name of `ANGLES`: mean absolute error, then without the mean difference of each side
     raw: dict[str, float]
     shifted: dict[str, float]
+    pelvis: float  #: mean distance of the pelvis from the true place, mm
 
 
 def main() -> int:
@@ -270,7 +271,16 @@ def _run(
     compared = {} if parameters is None else gait_errors(parameters, truth, events)
     inside = [(t >= track.time[0]) & (t <= track.time[-1]) for t in events.strike.values()]
     asked = int(sum(max(0, each.sum() - 1) for each in inside))
-    return Run(clip.name, arm, seed, compared, asked, *_angle_errors(track, truth))
+    return Run(
+        clip.name, arm, seed, compared, asked, *_angle_errors(track, truth), _pelvis_error(track, truth)
+    )
+
+
+def _pelvis_error(track: Joints, truth: Joints) -> float:
+    """Mean distance of the pelvis from the true place, mm."""
+    _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
+    off = track.places["pelvis"][ours] - truth.places["pelvis"][theirs]
+    return 1e3 * float(np.linalg.norm(off, axis=1).mean())
 
 
 def _angle_errors(track: Joints, truth: Joints) -> tuple[dict[str, float], dict[str, float]]:
@@ -374,6 +384,9 @@ def _beside_others(runs: list[Run]) -> Iterator[list[Any]]:
         for arm in ARMS[:2]:
             values = []
             for name in names:
+                if name == "pelvis":
+                    values.append(float(np.mean([run.pelvis for run in _chosen(runs, None, arm)])))
+                    continue
                 if name in ANGLES:
                     values.append(float(np.mean([run.raw[name] for run in _chosen(runs, None, arm)])))
                     continue
@@ -460,6 +473,7 @@ def _write_values(path: Path, runs: list[Run]) -> None:
             for name, c in run.compared.items():
                 for values in zip(c.found, c.true, c.sd, strict=True):
                     writer.writerow([*start, name, *(f"{v:.5g}" if np.isfinite(v) else "" for v in values)])
+            writer.writerow([*start, "pelvis_error_m", f"{1e-3 * run.pelvis:.5f}", "0", ""])
             for name in ANGLES:
                 writer.writerow([*start, f"{name}_error_deg", f"{run.raw[name]:.3f}", "0", ""])
                 writer.writerow([*start, f"{name}_error_shifted_deg", f"{run.shifted[name]:.3f}", "0", ""])
