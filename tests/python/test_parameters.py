@@ -111,6 +111,20 @@ def test_errors_that_last_cancel_between_the_ends_of_a_stride():
     np.testing.assert_allclose(right.sd["stride_length_m"] / right.values["stride_length_m"], 0.02, rtol=0.35)
 
 
+def test_the_persons_events_are_uncertain_in_every_stride_alike():
+    """Motions that agree exactly do not show how this person's feet strike and leave the ground."""
+    track = walking_track()
+    parameters = measure(track, drawn(track, late=0.0))
+    stride = 1 / 0.9
+    for kind, sd in (("strike", 0.010), ("off", 0.022)):
+        for times in getattr(parameters.event_sd, kind).values():
+            np.testing.assert_allclose(times[1:-1] / stride, sd, rtol=0.3)
+            assert np.ptp(times[1:-1]) < 1e-3
+    assert parameters.strides["right"].sd["stride_time_s"][1:-1].max() < 0.002
+    expected = 100 * np.hypot(0.010, 0.022) / np.sqrt(2)  # the feet are independent
+    assert parameters.summary()["stance_percent"]["both"]["sd"] == pytest.approx(expected, rel=0.3)
+
+
 def test_errors_of_a_camera_are_common_to_all_frames():
     """A place that is a metre off in all frames changes no stride; a scale that is off changes all."""
     track = walking_track(sd=0.01)

@@ -6,9 +6,9 @@ Parts:
 
 - position of the whole person: the same for all joints, cancels in every length;
 - size: scales every length alike, as the distance from the camera follows from the size in the picture;
-- person: joints differ from the model's by a constant and by a part that repeats with every stride,
-  independently on each side.  This cancels in strides, but not in steps, width, clearance or symmetry, and a
-  mean over strides does not reduce it;
+- person: feet differ from the model's by a constant and by a part that repeats with every stride, and strike
+  and leave the ground earlier or later, independently on each side.  This cancels in strides, but not in
+  events, steps, stance, width, clearance or symmetry, and a mean over strides does not reduce it;
 - errors that change within a stride;
 - camera, if it was estimated from the walk: common to all frames.
 
@@ -35,6 +35,7 @@ from gait.motion.footfalls import (
     moved_by_camera,
     same_events,
     stack,
+    walking_direction,
 )
 
 Array = NDArray[np.float64]
@@ -47,8 +48,13 @@ _COUNT = 100  # motions drawn if the track has none; a standard deviation is the
 # chosen on people of `gait simulate` who are in no reported result.
 _PERSON, _WANDER = 0.5, 0.15
 _LASTING_PHASE_SHARE = 0.6  # share of the variance of the phase that lasts
-_CONSTANT = 0.5  # share of the person's variance that is constant; the rest are `_WAVES` waves of the stride
-_WAVES = 2
+#: The person's part of a foot: standard deviations along the path, across it and up, of the constant and of
+#: the first and second wave of the stride, as multiples of that of a joint; and those of its strikes and
+#: toe-offs, strides.  Measured on walks of people left out of learning, then rounded on people of `gait
+#: simulate` who are in no reported result (decisions.md).
+_FOOT = np.array([[1.0, 0.95, 0.65], [0.5, 0.45, 0.35], [0.25, 0.25, 0.25]])
+_BY_WAVE = np.repeat(_FOOT, (1, 2, 2), axis=0)
+_STRIKE_SD, _OFF_SD = 0.010, 0.022
 _SMOOTH_S = 0.12  # duration over which errors within a stride are smooth
 _SIZE_SHARE = 0.7  # error of the size over the person's part of a joint: many joints determine the size
 
@@ -61,9 +67,9 @@ def draw_contacts(
         nothing = {side: _unknown(contacts(track, events, side, stride)) for side in STRIKE_SIDES}
         return nothing, _event_sd([events], unknown=True), "unknown: the track has no column phase_sd"
     drawn: dict[str, list[Contacts]] = {side: [] for side in STRIKE_SIDES}
-    found = []
+    found, random = [], np.random.default_rng(1)
     for motion in _motions(track, draws):
-        found.append(same_events(find_events(motion), events))
+        found.append(_shifted(same_events(find_events(motion), events), stride, random))
         for side in STRIKE_SIDES:
             drawn[side].append(contacts(motion, found[-1], side, stride))
     source = "the standard deviations of each frame, whose errors persist over frames"
@@ -75,6 +81,16 @@ def draw_contacts(
     return {side: stack(drawn[side]) for side in STRIKE_SIDES}, _event_sd(found), source
 
 
+def _shifted(events: Events, stride: float, random: np.random.Generator) -> Events:
+    """Shift all strikes of a foot alike, and all its toe-offs: the person's part of their errors."""
+    return Events(
+        *(
+            {side: times + stride * sd * random.standard_normal() for side, times in kind.items()}
+            for kind, sd in ((events.strike, _STRIKE_SD), (events.off, _OFF_SD))
+        )
+    )
+
+
 def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:
     """Yield motions of `UNCERTAIN_JOINTS` that agree with the track's standard deviations."""
     random = np.random.default_rng(0)
@@ -83,15 +99,18 @@ def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:
     sd = {name: _without_camera(track.sd[name], moved[name]) for name in UNCERTAIN_JOINTS}
     own = _person_sd(sd, draws)
     size = _size_sd(track, own, draws)
-    waves = _waves(track.phase)
+    waves, ways = _waves(track.phase), _ways(track)
     for d in range(count):
         places = _warped(track, random) if draws is None else draws.motion(d).places
         start, scale = places["pelvis"][0].copy(), 1 + size * random.standard_normal()
         camera = random.standard_normal(4)
+        feet = {side: waves @ (random.standard_normal((waves.shape[1], 3)) * _BY_WAVE) for side in "rl"}
         out = {}
         for name in UNCERTAIN_JOINTS:
-            lasting = waves @ (random.standard_normal((waves.shape[1], 3)) * own[name])
-            out[name] = start + scale * (places[name] - start) + lasting
+            out[name] = start + scale * (places[name] - start)
+            if name != "pelvis":
+                sizes = np.sqrt(np.einsum("nak,k->na", ways**2, own[name] ** 2))  # along each way
+                out[name] += np.einsum("na,nak->nk", feet[name[0]] * sizes, ways)
             if draws is None:
                 wander = _wander(track.time, 3, random)
                 out[name] += np.sqrt(_WANDER) * sd[name] * wander
@@ -140,14 +159,20 @@ def _size_sd(track: Track, own: dict[str, Array], draws: Draws | None) -> float:
 
 
 def _waves(phase: Array) -> Array:
-    """Constant and harmonics of the stride (n, 1 + 2 `_WAVES`), whose squares sum to 1 in every frame.
+    """Return a constant, and cosine and sine of each wave of the stride (n, rows of `_BY_WAVE`).
 
     Without a phase there is only the constant.
     """
     known = np.isfinite(phase)[:, None]
-    turn = 2 * np.pi * np.where(known, phase[:, None], 0.0) * np.arange(1, _WAVES + 1)
-    parts = known * np.hstack([np.cos(turn), np.sin(turn)]) * np.sqrt((1 - _CONSTANT) / _WAVES)
-    return np.hstack([np.where(known, np.sqrt(_CONSTANT), 1.0), parts])
+    turn = 2 * np.pi * np.where(known, phase[:, None], 0.0) * np.arange(1, len(_FOOT))
+    waves = np.stack([np.cos(turn), np.sin(turn)], axis=2).reshape(len(phase), -1)
+    return np.hstack([np.ones((len(phase), 1)), known * waves])
+
+
+def _ways(track: Track) -> Array:
+    """Return unit vectors along the path, across it and up, shape (n, 3, 3)."""
+    ahead, up = walking_direction(track), np.array([0.0, 0.0, 1.0])
+    return np.stack([ahead, np.cross(up, ahead), np.broadcast_to(up, ahead.shape)], axis=1)
 
 
 def _warped(track: Track, random: np.random.Generator) -> dict[str, Array]:
