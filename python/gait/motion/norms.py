@@ -49,6 +49,9 @@ BY_PACE = (
 )
 """Parameters whose norm comes from people with the same stride rate."""
 
+#: Standard deviations among people of differences between the sides that the model's components do not
+#: contain, percentage points: with them, norms are as wide as recorded people differ (decisions.md).
+_BEYOND_MODEL = {"asymmetry:step_time_s": 3.2, "asymmetry:stance_percent": 1.2}
 _PEOPLE = 40
 _STRIDES, _SAMPLES = 3.4, 48  # strides that each person walks, and frames per stride
 _SIDES_ALIKE = 0.65  # of models that do not state it: that of the 26 people of `make model` for `classes`
@@ -192,7 +195,8 @@ def people(model: Mapping[str, Any], rate: float, stature: float) -> dict[str, t
     for name in BY_PACE:
         values = np.array([row[name] for row in found if np.isfinite(row.get(name, np.nan))])
         if len(values) > _PEOPLE // 2:
-            out[name] = float(values.mean()), float(values.std(ddof=1))
+            sd = np.hypot(values.std(ddof=1), _BEYOND_MODEL.get(name, 0.0))
+            out[name] = float(values.mean()), float(sd)
     return out
 
 
