@@ -27,6 +27,7 @@ from floor_shapes import SHAPES, TRACKED
 from gait.body.model_curves import series
 from gait.body.skeleton import ANGLES, SIDES, default_skeleton
 from gait.errors import UserError
+from gait.io.track_file import Joints
 from gait.learn.cycles import sequence
 from gait.learn.cycles.sequence import Sequence
 from gait.learn.options import JOINT_CENTRES, LearnOptions
@@ -34,6 +35,8 @@ from gait.learn.prior import fit, model, people
 from gait.learn.rotations import unit
 from gait.learn.solve import readers, retarget
 from gait.learn.solve.body import Body
+from gait.motion.footfalls import STRIKE_SIDES, find_events
+from gait.motion.parameters import asymmetry, strides_of
 from gait.progress import progress
 from gait.reproducible import one_thread_for_good
 
@@ -43,22 +46,28 @@ CMU = "cmu_walk"
 #: Sources whose licences permit a shipped model, and sources that serve only as people left out.
 FREE = ("btk", "gaitalytics", "bvhtoolbox", "opensim", "mcgill", "cmu_more")
 OTHERS = ("ammr", "nimble", "ezc3d", "gaittoolbox", "c3dorg")
+UNEVEN = ("step_time_s", "stance_percent")
 SCALED = ("cmu_more",)  # lengths of limbs are generic there
 ACCLAIM = (CMU, "cmu_more")  # skeletons of CMU
 FOLDS, EVERY = 4, 0.1  # groups of people left out, seconds between the frames compared
 HEAD = 0.2  # metres above the neck, for recordings without a head
 RECORDED, ANATOMICAL = JOINT_CENTRES
+MEAN, SHIPPED = "mean", "as shipped"  # bodies
+#: Heels and toes by what is known of them: a strike is where the ankle is furthest ahead if there is no heel.
+FOOT = {"heel": ("heel", "ankle"), "toe": ("toe", "ankle")}
 SHOWN = ("hip_flexion", "knee_flexion", "ankle_flexion", "shoulder_flexion", "shoulder_rotation")
 NOTE = """\
 {walks} walks of {count} people; the people of a source have equal weights.  Angles are means over whole
 cycles and both sides, degrees; lengths are shares of the stature, per cent.  *anatomical*: `gait learn
 --joints anatomical`, which moves knees, ankles, shoulders and wrists of CMU's skeletons to where the markers
 of other laboratories put them.  In published walks (Plug-in-Gait) the knee is flexed by 22 to 25 degrees on
-average.
+average.  Asymmetries of step time and stance are 200 |right - left| / (right + left), percentage points,
+median over people; the scatter of their few strides is part of them.
 
 Floors, mm, median and mean over people: 14 joints after alignment of the pelvis, with 5 components and
-offsets of trunk, shoulders and elbows as in the tracker, on the mean body of the learners.  {folds} groups
-are left out of every source at once; people with recordings of the legs alone are not among the learners.
+offsets of trunk, shoulders and elbows as in the tracker.  *body*: the mean of the learners', or *as shipped*,
+the one that `gait learn` makes, whose joints are in anatomical places.  {folds} groups are left out of every
+source at once; people with recordings of the legs alone are not among the learners.
 People from elsewhere are the {new} whose whole body was recorded.
 
 {floors}
@@ -114,7 +123,37 @@ def row(name: str, some: list[Person]) -> list[Any]:
         lengths = [100 * float(np.mean(part)) / m.stature for part in parts]
         by_person.setdefault(walk.subject, []).append([*angles, *lengths])
     means = np.nanmean([np.nanmean(rows, axis=0) for rows in by_person.values()], axis=0)
-    return [name, len(by_person), *(f"{value:.1f}" if np.isfinite(value) else None for value in means)]
+    values = [*means, *usual_asymmetries(some)]
+    return [name, len(by_person), *(f"{value:.1f}" if np.isfinite(value) else None for value in values)]
+
+
+def usual_asymmetries(some: list[Person]) -> list[float]:
+    """Medians over people of the asymmetry of step time and of stance, without sign, percentage points."""
+    by_person: dict[str, list[list[float]]] = {}
+    for one in some:
+        if found := asymmetries(one):
+            by_person.setdefault(one.walk.subject, []).append(found)
+    means = [np.mean(rows, axis=0) for rows in by_person.values()]
+    return list(np.median(np.abs(means), axis=0)) if means else [np.nan] * len(UNEVEN)
+
+
+def asymmetries(one: Person) -> list[float]:
+    """Asymmetries of UNEVEN in a walk, per cent; empty if it shows no whole stride of either foot."""
+    joints = one.body.part(*one.walk.kept).joints
+    places = {"pelvis": joints["pelvis"]}
+    for side in "rl":
+        places[f"{side}_ankle"] = joints[f"{side}_ankle"]
+        for part, known in FOOT.items():
+            places[f"{side}_{part}"] = next(joints[name] for k in known if (name := f"{side}_{k}") in joints)
+    frame = np.flatnonzero(np.isfinite(np.concatenate(list(places.values()), axis=1)).all(axis=1))
+    motion = Joints(frame, frame / one.walk.fps, {name: place[frame] for name, place in places.items()})
+    try:
+        strides = strides_of(motion, find_events(motion))
+    except (UserError, IndexError):
+        return []
+    means = [[np.nanmean(strides[side].values[name]) for side in STRIKE_SIDES] for name in UNEVEN]
+    found = [float(asymmetry(*pair)) for pair in means]
+    return found if np.isfinite(found).all() else []
 
 
 def walk_of(one: Person) -> floor_fit.Walk | None:
@@ -138,13 +177,14 @@ def walk_of(one: Person) -> floor_fit.Walk | None:
     return floor_fit.Walk(s.subject, at, local[visible], channels, s.measures, s.fps / s.period.frames)
 
 
-def sections_of(learners: list[Person]) -> dict[str, Any]:
-    """Curves as tracked, on the mean body of the learners."""
+def sections_of(learners: list[Person]) -> dict[str, dict[str, Any]]:
+    """Curves as tracked, by body."""
     learned = fit.fit([one.walk for one in learners])
     bodies = {one.walk.subject: one.walk.measures for one in learners if one.walk.measures is not None}
     follows = {"PACE": series(learned.pace_curve, people.TERMS), "GAIT": model.gait_statistics(learned)}
-    skeleton = default_skeleton(retarget.mean_proportions(list(bodies.values())))
-    return SHAPES[TRACKED].sections(learned) | follows | skeleton.sections()
+    curves = SHAPES[TRACKED].sections(learned) | follows
+    shapes = {MEAN: retarget.mean_proportions(list(bodies.values())), SHIPPED: learned.proportions}
+    return {body: curves | default_skeleton(shape).sections() for body, shape in shapes.items()}
 
 
 def _shows_arms(one: Person) -> bool:
@@ -152,10 +192,12 @@ def _shows_arms(one: Person) -> bool:
     return bool(np.isfinite(one.walk.channels[:, ANGLES.index("l_shoulder_flexion")]).any())
 
 
-def floors(all_people: list[Person], sources: tuple[str, ...]) -> tuple[dict[str, float], dict[str, float]]:
-    """Floors of people of CMU and from elsewhere, each left out of the learners, by name."""
+def floors(
+    all_people: list[Person], sources: tuple[str, ...]
+) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
+    """Floors of people of CMU and from elsewhere, each left out of the learners, by body and name."""
     whole = [one for one in all_people if one.walk.measures is not None and walk_of(one) is not None]
-    found: tuple[dict[str, list[float]], ...] = ({}, {})
+    found: dict[str, tuple[dict[str, list[float]], ...]] = {MEAN: ({}, {}), SHIPPED: ({}, {})}
     for k in range(FOLDS):
         out = {
             name
@@ -170,10 +212,13 @@ def floors(all_people: list[Person], sources: tuple[str, ...]) -> tuple[dict[str
         made = sections_of(learners)
         for one in whole:
             if one.walk.subject in out:
-                kind = found[one.source != CMU]
-                mm = floor_fit.in_joints(walk_of(one), made).joints_mm
-                kind.setdefault(one.walk.subject, []).append(mm)
-    return tuple({who: float(np.mean(mm)) for who, mm in kind.items()} for kind in found)
+                for body, kinds in found.items():
+                    mm = floor_fit.in_joints(walk_of(one), made[body]).joints_mm
+                    kinds[one.source != CMU].setdefault(one.walk.subject, []).append(mm)
+    return {
+        body: tuple({who: float(np.mean(mm)) for who, mm in kind.items()} for kind in kinds)
+        for body, kinds in found.items()
+    }
 
 
 def floor_table(kinds: dict[str, list[Person]]) -> tuple[str, int]:
@@ -182,12 +227,13 @@ def floor_table(kinds: dict[str, list[Person]]) -> tuple[str, int]:
     new: dict[str, float] = {}
     for kind, all_people in kinds.items():
         for name, sources in (("CMU", (CMU,)), ("CMU and all free", (CMU, *FREE))):
-            cmu, new = floors(all_people, sources)
-            figures = (f"{f(list(x.values())):.1f}" for x in (cmu, new) for f in (np.median, np.mean))
-            rows.append([kind, name, *figures])
-            print(*rows[-1], {who: round(mm) for who, mm in (cmu | new).items()}, file=sys.stderr, flush=True)
-    head = ["joints", "learnt from", "CMU median", "CMU mean", "elsewhere median", "elsewhere mean"]
-    return table.markdown(head, [[str(c) for c in cells] for cells in rows], [False] * 2 + [True] * 4), len(
+            for body, (cmu, new) in floors(all_people, sources).items():
+                figures = (f"{f(list(x.values())):.1f}" for x in (cmu, new) for f in (np.median, np.mean))
+                rows.append([kind, name, body, *figures])
+                each = {who: round(mm) for who, mm in (cmu | new).items()}
+                print(*rows[-1], each, file=sys.stderr, flush=True)
+    head = ["joints", "learnt from", "body", "CMU median", "CMU mean", "elsewhere median", "elsewhere mean"]
+    return table.markdown(head, [[str(c) for c in cells] for cells in rows], [False] * 3 + [True] * 4), len(
         new
     )
 
@@ -219,7 +265,8 @@ def main() -> int:
     count = len({one.walk.subject for one in found})
     note = NOTE.format(walks=len(found), count=count, folds=FOLDS, new=new, floors=written)
     lengths = ("thigh", "shank", "sole", "shoulder", "upper arm", "forearm")
-    columns = ["source", "people", *(name.replace("_", " ") for name in SHOWN), *lengths]
+    uneven = ("step time asym.", "stance asym.")
+    columns = ["source", "people", *(name.replace("_", " ") for name in SHOWN), *lengths, *uneven]
     table.publish("learn_people", "People of several sources", columns, list(tables(kinds)), note)
     return 0
 
