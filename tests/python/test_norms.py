@@ -68,7 +68,7 @@ def test_people_whose_sides_differ_more_have_wider_norms_of_asymmetry():
     assert (np.diff(sds, axis=0) > 0).all() and sds[1][0] > 1.3 * sds[0][0]
 
 
-def test_norms_of_asymmetry_are_as_wide_as_recorded_people_differ():
+def test_norms_of_asymmetry_have_the_width_of_recorded_people():
     """Step time 3.5 and stance 1.3 percentage points, which the curves of the model alone do not show."""
     found = people(MODEL, 0.9, 1.72)
     assert found["asymmetry:step_time_s"] == pytest.approx((0.0, 3.5), abs=0.3)
