@@ -49,9 +49,9 @@ def test_install_puts_everything_and_uninstall_removes_it(installed):
     commands = ["gait", "gait-trackd", *(f"gait-{name.replace(' ', '-')}" for name in COMMANDS)]
     service |= {f"share/man/man1/{name}.1" for name in commands}
     assert names == libraries | described | headers | types | daemon | service | notices
-    told = (installed / "opt/gait/share/doc/libgait/notices.md").read_text()
+    listed = (installed / "opt/gait/share/doc/libgait/notices.md").read_text()
     for part in ("Eigen", "MPL-2.0", "LCM", "LGPL-2.1", "](README.md)"):
-        assert part in told
+        assert part in listed
     licence = (installed / "opt/gait/share/doc/libgait/lcm-COPYING").read_text()
     assert "GNU LESSER GENERAL PUBLIC LICENSE" in licence.upper()
     assert make("uninstall", f"DESTDIR={installed}", "PREFIX=/opt/gait").returncode == 0
