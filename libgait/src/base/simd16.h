@@ -239,64 +239,7 @@ static inline void simd16_narrow(const int32_t *in, int8_t *out)
 #endif
 }
 
-#if defined(__SSE4_1__) && defined(SIMD16_SSE2)
-/* simd16_bilinear of four as bytes, `hidden` where shown is 0. */
-static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
-                                          const int32_t *shown, int8_t hidden, int8_t *out)
-{
-    __m128i const bytes = _mm_setr_epi8(0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12);
-    __m128i const words = _mm_or_si128(bytes, _mm_set1_epi16((short)0x8000));
-    __m128i value[4], in[4];
-    for (int32_t i = 0; i < 4; i++) {
-        __m128i const w = words_load(four + 4 * i);
-        __m128i const down =
-            _mm_xor_si128(_mm_shuffle_epi8(words_load(v + 4 * i), bytes), _mm_set1_epi16(0x00ff));
-        __m128i const left = _mm_srai_epi16(_mm_slli_epi16(w, 8), 8);
-        __m128i const both = _mm_add_epi16(_mm_maddubs_epi16(down, w), left);
-        __m128i const fx = _mm_shuffle_epi8(words_load(u + 4 * i), words);
-        __m128i const across = _mm_add_epi16(_mm_xor_si128(fx, _mm_set1_epi32(0xffff)), _mm_set1_epi32(257));
-        __m128i const sum = _mm_madd_epi16(both, across);
-        __m128i const up = _mm_srli_epi32(_mm_srai_epi32(sum, 31), 16);
-        value[i] = _mm_srai_epi32(_mm_add_epi32(sum, up), 16);
-        in[i] = words_load(shown + 4 * i);
-    }
-    __m128i const all =
-        _mm_packs_epi16(_mm_packs_epi32(value[0], value[1]), _mm_packs_epi32(value[2], value[3]));
-    __m128i const on = _mm_packs_epi16(_mm_packs_epi32(in[0], in[1]), _mm_packs_epi32(in[2], in[3]));
-    _mm_storeu_si128((__m128i *)(void *)out, _mm_blendv_epi8(_mm_set1_epi8(hidden), all, on));
-}
-#elif defined(SIMD16_NEON)
-static inline int16x4_t bilinear4(const int32_t *four, const int32_t *u, const int32_t *v)
-{
-    int32x4_t const byte = vdupq_n_s32(255), fx = vandq_s32(vld1q_s32(u), byte),
-                    fy = vandq_s32(vld1q_s32(v), byte);
-    int16x8_t const w = vreinterpretq_s16_s32(vld1q_s32(four)), above = vshlq_n_s16(w, 8);
-    int16x8_t const down = vreinterpretq_s16_s32(vorrq_s32(fy, vshlq_n_s32(fy, 16)));
-    int32x4_t const both = vreinterpretq_s32_s16(
-        vmlaq_s16(above, vsubq_s16(vshrq_n_s16(w, 8), vshrq_n_s16(above, 8)), down)); /* left, right */
-    int32x4_t const left = vshrq_n_s32(vshlq_n_s32(both, 16), 16), right = vshrq_n_s32(both, 16);
-    int32x4_t const sum = vmlaq_s32(vshlq_n_s32(left, 8), vsubq_s32(right, left), fx);
-    uint32x4_t const up = vshrq_n_u32(vreinterpretq_u32_s32(vshrq_n_s32(sum, 31)), 16);
-    return vshrn_n_s32(vaddq_s32(sum, vreinterpretq_s32_u32(up)), 16);
-}
-
-/* All ones where v[i] is negative. */
-static inline uint8x16_t bytes_negative(const int32_t *v)
-{
-    int16x8_t const low = vcombine_s16(vqmovn_s32(vld1q_s32(v)), vqmovn_s32(vld1q_s32(v + 4)));
-    int16x8_t const high = vcombine_s16(vqmovn_s32(vld1q_s32(v + 8)), vqmovn_s32(vld1q_s32(v + 12)));
-    return vcltzq_s8(vcombine_s8(vqmovn_s16(low), vqmovn_s16(high)));
-}
-static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
-                                          const int32_t *shown, int8_t hidden, int8_t *out)
-{
-    int16x8_t const low = vcombine_s16(bilinear4(four, u, v), bilinear4(four + 4, u + 4, v + 4));
-    int16x8_t const high =
-        vcombine_s16(bilinear4(four + 8, u + 8, v + 8), bilinear4(four + 12, u + 12, v + 12));
-    vst1q_s8(out, vbslq_s8(bytes_negative(shown), vcombine_s8(vmovn_s16(low), vmovn_s16(high)),
-                           vdupq_n_s8(hidden)));
-}
-#else
+/* The same as bytes, `hidden` where shown is not negative. */
 static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u, const int32_t *v,
                                           const int32_t *shown, int8_t hidden, int8_t *out)
 {
@@ -307,7 +250,6 @@ static inline void simd16_bilinear_narrow(const int32_t *four, const int32_t *u,
         all[i] = shown[i] < 0 ? all[i] : hidden;
     simd16_narrow(all, out);
 }
-#endif
 
 typedef struct simd16_sums {
     int32_t low, dot,
@@ -489,11 +431,24 @@ static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, u
 }
 
 #ifdef SIMD4
-/* The first if it is less (greater), else the second. */
+/* Sixteen numbers of which each is multiplied with registers. */
+#if defined(SIMD16_NEON)
+#define SIMD4_NUMBERS(name, from)                                                                            \
+    float32x4_t const name[4] = {vld1q_f32(from), vld1q_f32((from) + 4), vld1q_f32((from) + 8),              \
+                                 vld1q_f32((from) + 12)}
+#define SIMD4_NUMBER(name, k)   ((simd4_f)vdupq_laneq_f32(name[(k) / 4], (k) % 4))
+#define SIMD4_TIMES(name, k, x) ((simd4_f)vmulq_laneq_f32((float32x4_t)(x), name[(k) / 4], (k) % 4))
+#else
+#define SIMD4_NUMBERS(name, from) const float *const name = (from)
+#define SIMD4_NUMBER(name, k)     simd4_all(name[k])
+#define SIMD4_TIMES(name, k, x)   (simd4_all(name[k]) * (x))
+#endif
+
+/* The second must be a number; of zeros of both signs, either. */
 static inline simd4_f simd4_min(simd4_f a, simd4_f b)
 {
 #if defined(SIMD16_NEON)
-    return (simd4_f)vbslq_f32(vcltq_f32((float32x4_t)a, (float32x4_t)b), (float32x4_t)a, (float32x4_t)b);
+    return (simd4_f)vminnmq_f32((float32x4_t)a, (float32x4_t)b);
 #else
     return (simd4_f)_mm_min_ps((__m128)a, (__m128)b);
 #endif
@@ -501,7 +456,7 @@ static inline simd4_f simd4_min(simd4_f a, simd4_f b)
 static inline simd4_f simd4_max(simd4_f a, simd4_f b)
 {
 #if defined(SIMD16_NEON)
-    return (simd4_f)vbslq_f32(vcgtq_f32((float32x4_t)a, (float32x4_t)b), (float32x4_t)a, (float32x4_t)b);
+    return (simd4_f)vmaxnmq_f32((float32x4_t)a, (float32x4_t)b);
 #else
     return (simd4_f)_mm_max_ps((__m128)a, (__m128)b);
 #endif
@@ -513,6 +468,14 @@ static inline simd4_f simd4_inside(simd4_f y, simd4_f from, simd4_f to, simd4_f 
     typedef int32_t words __attribute__((vector_size(16)));
     return (simd4_f)((words)x & (y >= from) & (y < to));
 }
+
+#if !defined(SIMD16_NEON)
+static inline __m128i two_words(const uint64_t *a, const uint64_t *b)
+{
+    __m128d const low = _mm_load_sd((const double *)(const void *)a);
+    return _mm_castpd_si128(_mm_loadh_pd(low, (const double *)(const void *)b));
+}
+#endif
 
 /* Draw one limb into four rows of masks. The bits from `from` up to `to` (numbers of at most 64, rounded towards 0;
  * less than 0 counts as 0) are set in `whole`; those that were not set before are returned in `visible`. */
@@ -531,113 +494,23 @@ static inline void simd4_cover(simd4_f from, simd4_f to, uint64_t *restrict whol
     vst1q_u64(whole, vorrq_u64(low_nearer, low));
     vst1q_u64(whole + 2, vorrq_u64(high_nearer, high));
 #else
-    /* Byte k of a word of bits [c, 64) from max(c - 8 k, 0), of which 8 and more leave none. */
-    __m128i const before = _mm_set_epi64x(0x3830282018100800, 0x3830282018100800), eight = _mm_set1_epi8(8);
-    __m128i const bits = _mm_set_epi64x(0, (int64_t)0x80c0e0f0f8fcfeff);
-    __m128i const columns =
-        _mm_packs_epi32(_mm_cvttps_epi32((__m128)from), _mm_cvttps_epi32((__m128)to)); /* four of each */
-    __m128i const c = _mm_packus_epi16(columns, columns);
-    for (int32_t i = 0; i < 2; i++) {
-        __m128i const pick = _mm_set1_epi8((char)(2 * i));
-        __m128i const row = _mm_add_epi8(_mm_set_epi64x(0x0101010101010101, 0), pick);
-        __m128i const left = _mm_subs_epu8(_mm_shuffle_epi8(c, row), before);
-        __m128i const right = _mm_subs_epu8(_mm_shuffle_epi8(c, _mm_add_epi8(row, _mm_set1_epi8(4))), before);
-        __m128i const mine = _mm_andnot_si128(_mm_shuffle_epi8(bits, _mm_min_epu8(right, eight)),
-                                              _mm_shuffle_epi8(bits, _mm_min_epu8(left, eight)));
-        __m128i *const all = (__m128i *)(void *)(whole + 2 * i);
+    __m128 const none = _mm_setzero_ps();
+    int32_t left[4], right[4];
+    _mm_storeu_si128((__m128i *)(void *)left, _mm_cvttps_epi32(_mm_max_ps((__m128)from, none)));
+    _mm_storeu_si128((__m128i *)(void *)right, _mm_cvttps_epi32(_mm_max_ps((__m128)to, none)));
+    SIMD16_STORED(left);
+    SIMD16_STORED(right);
+    for (int32_t i = 0; i < 4; i += 2) {
+        __m128i const mine = _mm_andnot_si128(two_words(&grid_from[right[i]], &grid_from[right[i + 1]]),
+                                              two_words(&grid_from[left[i]], &grid_from[left[i + 1]]));
+        __m128i *const all = (__m128i *)(void *)(whole + i);
         __m128i const nearer = _mm_loadu_si128(all);
         _mm_storeu_si128(all, _mm_or_si128(nearer, mine));
-        _mm_storeu_si128((__m128i *)(void *)(visible + 2 * i), _mm_andnot_si128(nearer, mine));
+        _mm_storeu_si128((__m128i *)(void *)(visible + i), _mm_andnot_si128(nearer, mine));
     }
 #endif
 }
 
-/* Sixteen points of a mask as bytes: those of a column or row are exact from -128 to 126. */
-#if defined(SIMD16_NEON)
-typedef int8x16_t simd16_bytes;
-#else
-typedef __m128i simd16_bytes;
-#endif
-
-/* (v[i] >> shift) - from, saturated. */
-static inline simd16_bytes simd16_bytes_of(const int32_t *v, int32_t shift, int32_t from)
-{
-#if defined(SIMD16_NEON)
-    int32x4_t const by = vdupq_n_s32(-shift);
-    int16x8_t const off = vdupq_n_s16((int16_t)from);
-    int16x8_t const low =
-        vcombine_s16(vqmovn_s32(vshlq_s32(vld1q_s32(v), by)), vqmovn_s32(vshlq_s32(vld1q_s32(v + 4), by)));
-    int16x8_t const high = vcombine_s16(vqmovn_s32(vshlq_s32(vld1q_s32(v + 8), by)),
-                                        vqmovn_s32(vshlq_s32(vld1q_s32(v + 12), by)));
-    return vcombine_s8(vqmovn_s16(vqsubq_s16(low, off)), vqmovn_s16(vqsubq_s16(high, off)));
-#else
-    __m128i const off = _mm_set1_epi16((int16_t)from);
-    __m128i const low =
-        _mm_packs_epi32(_mm_srai_epi32(words_load(v), shift), _mm_srai_epi32(words_load(v + 4), shift));
-    __m128i const high =
-        _mm_packs_epi32(_mm_srai_epi32(words_load(v + 8), shift), _mm_srai_epi32(words_load(v + 12), shift));
-    return _mm_packs_epi16(_mm_subs_epi16(low, off), _mm_subs_epi16(high, off));
-#endif
-}
-
-/* All ones where 0 <= row < rows, 0 <= column < 64 and shown is negative. */
-static inline simd16_bytes simd16_bytes_inside(simd16_bytes row, int32_t rows, simd16_bytes column,
-                                               const int32_t *shown)
-{
-#if defined(SIMD16_NEON)
-    uint8x16_t const on = bytes_negative(shown);
-    uint8x16_t const across = vcltq_u8(vreinterpretq_u8_s8(column), vdupq_n_u8(64));
-    uint8x16_t const down = vcltq_u8(vreinterpretq_u8_s8(row), vdupq_n_u8((uint8_t)rows));
-    return vreinterpretq_s8_u8(vandq_u8(on, vandq_u8(across, down)));
-#else
-    __m128i const none = _mm_setzero_si128();
-    __m128i const low = _mm_packs_epi32(words_load(shown), words_load(shown + 4));
-    __m128i const high = _mm_packs_epi32(words_load(shown + 8), words_load(shown + 12));
-    __m128i const across = _mm_cmpeq_epi8(_mm_and_si128(column, _mm_set1_epi8((char)0xc0)), none);
-    __m128i const beyond = _mm_cmpeq_epi8(_mm_subs_epu8(_mm_set1_epi8((char)rows), row), none);
-    return _mm_andnot_si128(beyond, _mm_and_si128(across, _mm_packs_epi16(low, high)));
-#endif
-}
-
-/* at[i] = 8 row + column / 8: the byte of a mask's first word. */
-static inline void simd16_byte_places(simd16_bytes row, simd16_bytes column, uint16_t *at)
-{
-#if defined(SIMD16_NEON)
-    uint8x16_t const r = vreinterpretq_u8_s8(row), c = vshrq_n_u8(vreinterpretq_u8_s8(column), 3);
-    vst1q_u16(at, vaddw_u8(vshll_n_u8(vget_low_u8(r), 3), vget_low_u8(c)));
-    vst1q_u16(at + 8, vaddw_high_u8(vshll_high_n_u8(r, 3), c));
-#else
-    __m128i const eighths = _mm_and_si128(_mm_srli_epi16(column, 3), _mm_set1_epi8(7)),
-                  by = _mm_set1_epi16(0x0108);
-    _mm_storeu_si128((__m128i *)(void *)at, _mm_maddubs_epi16(_mm_unpacklo_epi8(row, eighths), by));
-    _mm_storeu_si128((__m128i *)(void *)(at + 8), _mm_maddubs_epi16(_mm_unpackhi_epi8(row, eighths), by));
-#endif
-}
-
-/* shown[i] = -1 where bit column[i], modulo 8, of bits[i] and a bit of in[i] are set, elsewhere 0. */
-static inline void simd16_bytes_show(const uint8_t *bits, simd16_bytes column, simd16_bytes in,
-                                     int32_t *shown)
-{
-#if defined(SIMD16_NEON)
-    int8x16_t const low = vandq_s8(column, vdupq_n_s8(7));
-    uint8x16_t const bit = vshlq_u8(vdupq_n_u8(1), low);
-    int8x16_t const on = vandq_s8(vreinterpretq_s8_u8(vtstq_u8(vld1q_u8(bits), bit)), in);
-    int16x8_t const a = vmovl_s8(vget_low_s8(on)), b = vmovl_high_s8(on);
-    vst1q_s32(shown, vmovl_s16(vget_low_s16(a)));
-    vst1q_s32(shown + 4, vmovl_high_s16(a));
-    vst1q_s32(shown + 8, vmovl_s16(vget_low_s16(b)));
-    vst1q_s32(shown + 12, vmovl_high_s16(b));
-#else
-    __m128i const powers = _mm_set1_epi64x((int64_t)0x8040201008040201);
-    __m128i const bit = _mm_shuffle_epi8(powers, _mm_and_si128(column, _mm_set1_epi8(7)));
-    __m128i const on = _mm_and_si128(
-        _mm_cmpeq_epi8(_mm_and_si128(_mm_loadu_si128((const __m128i *)(const void *)bits), bit), bit), in);
-    words_store(shown, _mm_cvtepi8_epi32(on));
-    words_store(shown + 4, _mm_cvtepi8_epi32(_mm_srli_si128(on, 4)));
-    words_store(shown + 8, _mm_cvtepi8_epi32(_mm_srli_si128(on, 8)));
-    words_store(shown + 12, _mm_cvtepi8_epi32(_mm_srli_si128(on, 12)));
-#endif
-}
 #endif
 
 /* Transpose sixteen numbers of sixteen bodies from in[number][body] to out[body][number], one cache line

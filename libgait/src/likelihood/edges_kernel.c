@@ -2,6 +2,7 @@
 #include "base/dispatch.h"
 #include "base/simd16.h"
 #include "likelihood/term.h"
+#include "likelihood/simd_points.h"
 #include "likelihood/visible.h"
 
 #include <string.h>
@@ -16,6 +17,92 @@ static const float SHARES[2][SIMD16] = {
     [LIMB_ELLIPSOID] = {0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.75f, 0.75f, 0.75f, 0.75f,
                         0.75f, 0.75f, 0.75f, 0.75f}};
 
+#ifdef SIMD4
+typedef struct limb_points { /* the side that each point is on: of points 4 i .. 4 i + 3 in [i & 1] */
+    simd4_f x[2], y[2], dx[2], dy[2], normal[2];
+} limb_points;
+
+static inline void cone(const float *w, limb_points *restrict out)
+{
+    for (int32_t k = 0; k < 2; k++) {
+        out->x[k] = simd4_twice(w + LIKE_SIDE_X);
+        out->y[k] = simd4_twice(w + LIKE_SIDE_Y);
+        out->dx[k] = simd4_twice(w + LIKE_SIDE_DX);
+        out->dy[k] = simd4_twice(w + LIKE_SIDE_DY);
+        out->normal[k] = simd4_twice(w + LIKE_SIDE_NORMAL);
+    }
+}
+
+static inline void ellipsoid(const like_sides *s, int32_t lane, limb_points *restrict out)
+{
+    for (int32_t k = 0; k < 2; k++) {
+        out->x[k] = simd4_load(s->part[0][lane] + 4 * k);
+        out->y[k] = simd4_load(s->part[0][lane] + 8 + 4 * k);
+        out->dx[k] = simd4_load(s->part[1][lane] + 4 * k);
+        out->dy[k] = simd4_load(s->part[1][lane] + 8 + 4 * k);
+        out->normal[k] = simd4_load(s->part[2][lane] + 4 * k);
+    }
+}
+
+typedef struct spots { /* points on the outline of a limb */
+    simd16_bytes u, v; /* working pixels */
+    simd4_i normal[2];
+} spots;
+
+static inline void place(const limb_points *s, const float *share, const float inner[2],
+                         const grid_mask *mask, spots *restrict out, simd16_cells *restrict inside)
+{
+    simd4_f const outer = simd4_all(0.5f * (1.0f - LIKE_INWARD)); /* cells */
+    simd4_f const inner_x = simd4_all(inner[0]), inner_y = simd4_all(inner[1]);
+    simd4_i u[4], v[4], column[4], row[4], shown[4];
+#pragma GCC unroll 4
+    for (int32_t i = 0; i < 4; i++) {
+        simd4_f const at = simd4_load(share + 4 * i);
+        simd4_f const x = s->x[i & 1] + at * s->dx[i & 1], y = s->y[i & 1] + at * s->dy[i & 1];
+        u[i] = simd4_whole(x);
+        v[i] = simd4_whole(y);
+        shown[i] = (simd4_i)((simd4_u)(u[i] | v[i]) < (simd4_u){VIEW_SIZE, VIEW_SIZE, VIEW_SIZE, VIEW_SIZE});
+        /* There the visible mask of the limb shows whether something nearer hides this point. */
+        column[i] = simd4_whole(outer * x + inner_x);
+        row[i] = simd4_whole(outer * y + inner_y);
+    }
+    out->u = simd16_low(u);
+    out->v = simd16_low(v);
+    for (int32_t k = 0; k < 2; k++)
+        out->normal[k] = simd4_whole(s->normal[k]);
+    *inside = (simd16_cells){simd16_from(row, mask->first), simd16_from(column, mask->column),
+                             simd16_conditions(shown)};
+}
+
+/* 2 n'Tn = trace + (xx - yy) cos 2a + 2 xy sin 2a; 0 where a point is hidden. */
+void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
+{
+    int32_t const limbs = b->setup->limbs, lane = b->lane;
+    spots p[MODEL_MAX_LIMBS];
+    simd16_cells inside[MODEL_MAX_LIMBS];
+    uint32_t word[MODEL_MAX_LIMBS][SIMD16];
+    simd16_tally tally = simd16_tally_none();
+    for (int32_t l = 0; l < limbs; l++) {
+        const like_sides *const o = &b->sides->limb[l];
+        int32_t const shape = b->setup->geometry[l].shape;
+        bool const round = shape == LIMB_ELLIPSOID;
+        limb_points s;
+        if (round)
+            ellipsoid(o, lane, &s);
+        else
+            cone(o->part[0][lane], &s);
+        place(&s, SHARES[shape], round ? o->part[2][lane] + 8 : o->part[0][lane] + LIKE_SIDE_INNER,
+              &b->layers->visible[l], &p[l], &inside[l]);
+    }
+    simd16_covered(b->layers->visible, limbs, inside);
+    for (int32_t l = 0; l < limbs; l++)
+        simd16_words_at(b->features->edge, 4, p[l].v & inside[l].on, p[l].u & inside[l].on, word[l]);
+    for (int32_t l = 0; l < limbs; l++)
+        simd16_tally_add(&tally, word[l], p[l].normal, inside[l].on);
+    simd16_sums const sum = simd16_tally_sums(&tally);
+    *out = (like_edge_tally){sum.low * 64 + sum.dot, sum.low * 64, sum.count};
+}
+#else
 typedef struct limb_points { /* the side that each point is on */
     float x[SIMD16], y[SIMD16], dx[SIMD16], dy[SIMD16], normal[SIMD16];
 } limb_points;
@@ -92,3 +179,4 @@ void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
     simd16_lookup(b->features->edge, p.cell[0], p.shown[0], limbs * SIMD16, p.cell[0]);
     *out = tally(&p, limbs);
 }
+#endif

@@ -31,20 +31,21 @@ static void count_rows(const uint64_t *body, const uint64_t (*words)[GRID_SIZE],
                        int32_t *cells, int32_t *sum)
 {
     const uint64_t *const inside = words[FOREGROUND_PLANES];
-    uint16x8_t count = vdupq_n_u16(0), covered = count;
+    uint16x8_t count = vdupq_n_u16(0), part[FOREGROUND_PLANES];
     int32_t y = first;
+    for (int32_t k = 0; k < FOREGROUND_PLANES; k++)
+        part[k] = count;
     for (; y + 2 <= last; y += 2) {
         uint64x2_t const m = vandq_u64(vld1q_u64(body + y), vld1q_u64(inside + y));
-        uint8x16_t part = vdupq_n_u8(0);
-#pragma GCC unroll 4
-        for (int32_t k = FOREGROUND_PLANES; k-- > 0;) /* the bits of greatest weight are doubled most often */
-            part = vaddq_u8(vaddq_u8(part, part),
-                            vcntq_u8(vreinterpretq_u8_u64(vandq_u64(m, vld1q_u64(words[k] + y)))));
         count = vpadalq_u8(count, vcntq_u8(vreinterpretq_u8_u64(m)));
-        covered = vpadalq_u8(covered, part);
+#pragma GCC unroll 4
+        for (int32_t k = 0; k < FOREGROUND_PLANES; k++)
+            part[k] =
+                vpadalq_u8(part[k], vcntq_u8(vreinterpretq_u8_u64(vandq_u64(m, vld1q_u64(words[k] + y)))));
     }
     *cells += (int32_t)vaddlvq_u16(count);
-    *sum += (int32_t)vaddlvq_u16(covered);
+    for (int32_t k = 0; k < FOREGROUND_PLANES; k++)
+        *sum += (int32_t)vaddlvq_u16(part[k]) << k;
     for (; y < last; y++) {
         uint64_t const m = body[y] & inside[y];
         *cells += grid_popcount(m);

@@ -4,6 +4,7 @@
 #include "base/fmath.h"
 #include "base/simd16.h"
 #include "likelihood/term.h"
+#include "likelihood/simd_points.h"
 #include "likelihood/visible.h"
 #include <string.h>
 
@@ -97,6 +98,72 @@ void KERNEL(surface_pose)(const like_setup *s, const gait_camera *cam, const vie
 
 /* ---- the points of one body ---- */
 
+#ifdef SIMD4
+/* Project the points of half a limb, to 1/256 working pixels: shown are those that face the camera well enough and are in
+ * the image. */
+static inline simd16_bytes place(const like_surface *s, int32_t first, const float *view, simd4_i u[4],
+                                 simd4_i v[4])
+{
+    float const end = (float)((VIEW_SIZE - 1) * LIKE_SUBPIXELS); /* one pixel further has no neighbours */
+    enum { X = LIKE_VIEW_IMAGE, Y = X + 3, Z = Y + 3, S = LIKE_VIEW_SHIFT, E = LIKE_VIEW_ORIGIN };
+    simd4_f const near = simd4_all(CAMERA_NEAR), graze = simd4_all(view[LIKE_VIEW_GRAZE]);
+    simd4_u const bound = {m_bits(end), m_bits(end), m_bits(end), m_bits(end)};
+    SIMD4_NUMBERS(w, view);
+    simd4_i shown[4];
+#pragma GCC unroll SIMD4_UNROLL
+    for (int32_t i = 0; i < 4; i++) {
+        int32_t const j = first + 4 * i;
+        simd4_f const px = simd4_load(s->point[0] + j), py = simd4_load(s->point[1] + j),
+                      pz = simd4_load(s->point[2] + j);
+        simd4_f const z = SIMD4_TIMES(w, Z, px) + SIMD4_TIMES(w, Z + 1, py) + SIMD4_TIMES(w, Z + 2, pz) +
+                          SIMD4_NUMBER(w, S + 2);
+        simd4_f const inv = simd4_all(1.0f) / simd4_max(z, near);
+        simd4_f const x = (SIMD4_TIMES(w, X, px) + SIMD4_TIMES(w, X + 1, py) + SIMD4_TIMES(w, X + 2, pz) +
+                           SIMD4_NUMBER(w, S)) *
+                          inv;
+        simd4_f const y = (SIMD4_TIMES(w, Y, px) + SIMD4_TIMES(w, Y + 1, py) + SIMD4_TIMES(w, Y + 2, pz) +
+                           SIMD4_NUMBER(w, S + 1)) *
+                          inv;
+        simd4_f const away = SIMD4_TIMES(w, E, simd4_load(s->normal[0] + j)) +
+                             SIMD4_TIMES(w, E + 1, simd4_load(s->normal[1] + j)) +
+                             SIMD4_TIMES(w, E + 2, simd4_load(s->normal[2] + j)) + simd4_load(s->outward + j);
+        /* Non-negative floats are ordered like their bits; the bits of negative ones are greater. */
+        shown[i] = (away < graze) & (simd4_i)(simd4_greater((simd4_u)x, (simd4_u)y) < bound);
+        u[i] = simd4_whole(x);
+        v[i] = simd4_whole(y);
+    }
+    return simd16_conditions(shown);
+}
+
+void KERNEL(surface_sample)(const like_setup *s, const features *f, const like_pose *pose, int32_t lane,
+                            const layers *drawn, like_patch *restrict out)
+{
+    struct {
+        simd16_bytes x, y, fx, fy;
+    } at[MODEL_MAX_LIMBS]; /* working pixels, with fractions */
+    simd16_cells cell[MODEL_MAX_LIMBS];
+    uint32_t four[MODEL_MAX_LIMBS][SIMD16];
+    for (int32_t l = 0; l < s->limbs; l++) {
+        const grid_mask *const mask = &drawn->visible[l];
+        int32_t const turn = pose->limb[l].turn[lane];
+        simd4_i u[4], v[4];
+        cell[l].on = place(&s->surface[l], 2 * turn, pose->limb[l].view[lane], u, v);
+        simd16_split(u, &at[l].x, &at[l].fx);
+        simd16_split(v, &at[l].y, &at[l].fy);
+        cell[l].row = (at[l].y >> 1) - simd16_all(mask->first);
+        cell[l].column = (at[l].x >> 1) - simd16_all(mask->column);
+        out[l].turn = (uint8_t)turn;
+    }
+    simd16_covered(drawn->visible, s->limbs, cell);
+    for (int32_t l = 0; l < s->limbs; l++)
+        simd16_words_at(f->pairs, 2, at[l].y & cell[l].on, at[l].x & cell[l].on, four[l]);
+    for (int32_t l = 0; l < s->limbs; l++) {
+        simd16_bytes const on = cell[l].on, value = simd16_between(four[l], at[l].fx, at[l].fy);
+        simd16_bytes const sample = (value & on) | (simd16_all(TEXTURE_HIDDEN) & ~on);
+        memcpy(out[l].value, &sample, sizeof sample);
+    }
+}
+#else
 typedef struct spots { /* the points of half of each limb */
     int32_t u[MODEL_MAX_LIMBS][LIKE_HALF],
         v[MODEL_MAX_LIMBS][LIKE_HALF];      /* 1/256 working pixels, 0 where not shown */
@@ -175,3 +242,4 @@ void KERNEL(surface_sample)(const like_setup *s, const features *f, const like_p
          LIKE_CELL_BITS, p.shown);
     read_surface(f, &p, s->limbs, out);
 }
+#endif

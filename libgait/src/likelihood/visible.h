@@ -7,7 +7,7 @@
 #include "base/grid_mask.h"
 #include "model/model.h"
 
-#if defined(__AVX512F__) || defined(SIMD4)
+#if defined(__AVX512F__)
 #define HIDE_ANY                                                                                             \
     KERNEL_ROW /* rarely used, since most masks are small: inlining it would only cost registers */
 #else
@@ -55,46 +55,11 @@ static inline void hide_small(const grid_mask *mask, const int32_t *x, const int
 }
 #endif
 
-#ifdef SIMD4
-/* All points of a limb as bytes; for masks of one word and fewer than 128 rows. All bits are read before the first is
- * used: a load of several bytes would have to wait for their stores. */
-static inline void hide_narrow(const grid_mask *mask, int32_t limbs, const int32_t (*x)[SIMD16],
-                               const int32_t (*y)[SIMD16], int32_t shift, int32_t (*restrict shown)[SIMD16])
-{
-    simd16_bytes column[MODEL_MAX_LIMBS], in[MODEL_MAX_LIMBS];
-    uint16_t at[MODEL_MAX_LIMBS][SIMD16];
-    uint8_t bits[MODEL_MAX_LIMBS][SIMD16];
-    for (int32_t l = 0; l < limbs; l++) {
-        simd16_bytes const row = simd16_bytes_of(y[l], shift, mask[l].first);
-        column[l] = simd16_bytes_of(x[l], shift, mask[l].column);
-        in[l] = simd16_bytes_inside(row, mask[l].last - mask[l].first, column[l], shown[l]);
-        simd16_byte_places(row & in[l], column[l] & in[l], at[l]);
-    }
-    for (int32_t l = 0; l < limbs; l++) {
-        const uint8_t *const bytes = (const uint8_t *)(mask[l].word[0] + mask[l].first);
-#pragma GCC unroll 16
-        for (int32_t i = 0; i < SIMD16; i++)
-            bits[l][i] = (uint8_t)simd16_single(bytes[at[l][i]]);
-    }
-    for (int32_t l = 0; l < limbs; l++)
-        simd16_bytes_show(bits[l], column[l], in[l], shown[l]);
-}
-#endif
-
 /* Points are shown where `shown` is negative. Those of each limb at (x, y) in units of 2^-shift cells stay shown only
  * where their cell is in the limb's mask. */
 static inline void hide(const grid_mask *mask, int32_t limbs, const int32_t (*x)[SIMD16],
                         const int32_t (*y)[SIMD16], int32_t shift, int32_t (*restrict shown)[SIMD16])
 {
-#ifdef SIMD4
-    bool narrow = true;
-    for (int32_t l = 0; l < limbs; l++)
-        narrow &= (mask[l].width == 64) & (mask[l].last - mask[l].first < 128);
-    if (narrow) {
-        hide_narrow(mask, limbs, x, y, shift, shown);
-        return;
-    }
-#endif
     for (int32_t l = 0; l < limbs; l++)
 #if defined(__AVX512F__)
         if (mask[l].small)

@@ -19,12 +19,12 @@ typedef struct layers {
  * so that on both sides the greatest value decides. */
 typedef struct layers_limb {
     float line[BLOCK][4 * LAYERS_LINES]; /* (at left, at right, slope left, slope right) of each line */
+    int32_t lines[BLOCK];                /* the first 2 decide on each side, or more */
     int32_t top[BLOCK], end[BLOCK];      /* no rows if behind the camera */
 } layers_limb;
 
 typedef struct layers_block {
-    int32_t lines[MODEL_MAX_LIMBS]; /* lines on each side: 3 for a cone, LAYERS_LINES for an ellipsoid */
-    int32_t count;                  /* limbs */
+    int32_t count;                                                  /* limbs */
     int32_t first[BLOCK], last[BLOCK], column[BLOCK], width[BLOCK]; /* of the mask of the whole body */
     uint8_t order[BLOCK][MODEL_MAX_LIMBS]; /* near to far, then those behind the camera */
     _Alignas(GAIT_ALIGN) layers_limb limb[MODEL_MAX_LIMBS];

@@ -1,6 +1,7 @@
 /* The limbs of a block of bodies as lines in the grid, one lane a body; then the lines of one body as masks,
  * one lane a row, each limb without the cells that nearer limbs hide. */
 #include "base/dispatch.h"
+#include "base/fmath.h"
 #include "base/simd16.h"
 #include "raster/layers.h"
 
@@ -41,18 +42,25 @@ static box box_empty(void)
     return b;
 }
 
+/* The first where all bits of a mask are set, the second where none is. */
+static inline int32_t choose(int32_t mask, int32_t a, int32_t b)
+{
+    return (a & mask) | (b & ~mask);
+}
+
 /* Clip the rows of a limb, and extend the box of the body by them in whole bands of rows. */
-static void box_join(box *restrict body, const box *limb, const float *depth, layers_limb *restrict out)
+static void box_join(box *restrict body, const box *restrict limb, const float *restrict depth,
+                     layers_limb *restrict out)
 {
     for (int32_t i = 0; i < BLOCK; i++) {
         int32_t const top = i_max(limb->top[i], 0), end = i_min(limb->end[i], GRID_SIZE);
-        bool const front = depth[i] > 0.0f, met = front & (top < end);
-        out->top[i] = met ? top : 0;
-        out->end[i] = met ? end : 0;
-        body->top[i] = i_min(body->top[i], met ? top / LAYERS_BAND * LAYERS_BAND : GRID_SIZE);
-        body->end[i] = i_max(body->end[i], met ? (end + LAYERS_BAND - 1) / LAYERS_BAND * LAYERS_BAND : 0);
-        body->left[i] = i_min(body->left[i], met ? limb->left[i] : GRID_SIZE);
-        body->right[i] = i_max(body->right[i], met ? limb->right[i] : 0);
+        int32_t const front = -(int32_t)(depth[i] > 0.0f), met = front & -(int32_t)(top < end);
+        out->top[i] = top & met;
+        out->end[i] = end & met;
+        body->top[i] = i_min(body->top[i], choose(met, top & -LAYERS_BAND, GRID_SIZE));
+        body->end[i] = i_max(body->end[i], (end + LAYERS_BAND - 1) & -LAYERS_BAND & met);
+        body->left[i] = i_min(body->left[i], choose(met, limb->left[i], GRID_SIZE));
+        body->right[i] = i_max(body->right[i], limb->right[i] & met);
     }
 }
 
@@ -104,8 +112,28 @@ static void side(const corners *c, int32_t j, int32_t k, const int32_t *clockwis
     }
 }
 
-/* Opposite sides of an octagon, and the two ends of a cone, are parallel: one of them is on the left, the
- * other on the right. */
+/* Lines of the sides of a cone. Its ends are parallel: one of them is on the left, the other on the right. Its long
+ * sides are almost so. */
+enum { ONLY_LONG, END, LONG };
+
+/* Unless both long sides are on the left or both on the right, which is rare, no side of the body has more than one of
+ * them. */
+static void join_long_sides(line_lanes *restrict line, int32_t *restrict lines)
+{
+    float const nowhere = f_bound(-NOWHERE);
+    for (int32_t i = 0; i < BLOCK; i++)
+        lines[i] = 2;
+    for (int32_t right = 0; right < 2; right++)
+        for (int32_t i = 0; i < BLOCK; i++) {
+            float const a = line[LONG][0][right][i], b = line[LONG + 1][0][right][i];
+            uint32_t const first = m_less(nowhere, a), both = first & m_less(nowhere, b);
+            line[ONLY_LONG][0][right][i] = m_select(both, nowhere, m_select(first, a, b));
+            line[ONLY_LONG][1][right][i] = line[LONG][1][right][i] + line[LONG + 1][1][right][i];
+            lines[i] |= (int32_t)both & LAYERS_LINES;
+        }
+}
+
+/* Opposite sides of an octagon are parallel, too. */
 static void limb_lines(const outline_lanes *limb, int32_t n, box *restrict body, layers_limb *restrict out)
 {
     corners c;
@@ -125,7 +153,12 @@ static void limb_lines(const outline_lanes *limb, int32_t n, box *restrict body,
                 line[slot][1][right][i] = 0.0f;
             }
     for (int32_t k = 0; k < n; k++)
-        side(&c, k, (k + 1) % n, clockwise, &line[n == 4 && k == 3 ? 1 : k % LAYERS_LINES]);
+        side(&c, k, (k + 1) % n, clockwise, &line[n > 4 ? k % LAYERS_LINES : k % 2 ? END : LONG + k / 2]);
+    if (n > 4)
+        for (int32_t i = 0; i < BLOCK; i++)
+            out->lines[i] = LAYERS_LINES;
+    else
+        join_long_sides(line, out->lines);
     box_join(body, &own, limb->depth, out);
 }
 
@@ -184,7 +217,6 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
     out->count = count;
     for (int32_t l = 0; l < count; l++) {
         int32_t const n = outline_vertices(&limbs[l]);
-        out->lines[l] = n == 4 ? 3 : LAYERS_LINES;
         limb_lines(&outline->limb[l], n, &body, &out->limb[l]);
     }
     choose_columns(&body, out);
@@ -229,15 +261,18 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
 {
     simd4_f const slack = simd4_all(1.0f - SLACK), most = simd4_all(64.0f);
     simd4_f const from = simd4_all((float)top), to = simd4_all((float)end);
-    side_lines const left = side_of(line, lines), right = side_of(line + 1, lines);
     int32_t const first = top & -4;
+    side_lines const left = side_of(line, lines), right = side_of(line + 1, lines);
+    const uint64_t *const last = whole + end;
     simd4_f y = simd4_all((float)first) + (simd4_f){0.0f, 1.0f, 2.0f, 3.0f};
     memset(visible + (top & -LAYERS_BAND), 0, 4 * sizeof *visible); /* rows before `first` */
-    for (int32_t strip = first; strip < end; strip += 4) {
+    visible += first;
+    for (whole += first; whole < last; whole += 4) {
         simd4_f const begin = simd4_min(column_of(&left, lines, y) + slack, most);
         simd4_f const stop = simd4_min(slack - column_of(&right, lines, y), most);
-        simd4_cover(begin, simd4_inside(y, from, to, stop), whole + strip, visible + strip);
+        simd4_cover(begin, simd4_inside(y, from, to, stop), whole, visible);
         y += simd4_all(4.0f);
+        visible += 4;
     }
 }
 #else
@@ -260,9 +295,9 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
     simd16_repeat(line + 2, 2 * SIMD16_ROWS, slope[0]);
     simd16_repeat(line + 4, 2 * SIMD16_ROWS, at[1]);
     simd16_repeat(line + 6, 2 * SIMD16_ROWS, slope[1]);
-    simd16_repeat(line + 8, 2 * SIMD16_ROWS, at[2]);
-    simd16_repeat(line + 10, 2 * SIMD16_ROWS, slope[2]);
-    if (lines > 3) {
+    if (lines > 2) {
+        simd16_repeat(line + 8, 2 * SIMD16_ROWS, at[2]);
+        simd16_repeat(line + 10, 2 * SIMD16_ROWS, slope[2]);
         simd16_repeat(line + 12, 2 * SIMD16_ROWS, at[3]);
         simd16_repeat(line + 14, 2 * SIMD16_ROWS, slope[3]);
     }
@@ -274,8 +309,8 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
             float const sign = (float)(1 - 2 * (i & 1));
             float x = at[0][i] + slope[0][i] * y[i];
             x = f_max(at[1][i] + slope[1][i] * y[i], x);
-            x = f_max(at[2][i] + slope[2][i] * y[i], x);
-            x = lines > 3 ? f_max(at[3][i] + slope[3][i] * y[i], x) : x;
+            x = lines > 2 ? f_max(at[2][i] + slope[2][i] * y[i], x) : x;
+            x = lines > 2 ? f_max(at[3][i] + slope[3][i] * y[i], x) : x;
             span[i] = cell_from(sign * x) & -(int32_t)((y[i] >= from) & (y[i] < to));
             y[i] += (float)SIMD16_ROWS;
         }
@@ -299,10 +334,11 @@ static void draw_word(const layers_block *block, int32_t lane, int32_t word, lay
                 moved[i] = line[i] + (i & 2 ? 0.0f : (float)(i & 1 ? 64 : -64));
             line = moved;
         }
-        if (block->lines[l] == 3)
-            draw_limb(line, 3, limb->top[lane], limb->end[lane], whole, out->visible[l].word[word]);
+        if (limb->lines[lane] == 2)
+            draw_limb(line, 2, limb->top[lane], limb->end[lane], whole, out->visible[l].word[word]);
         else
-            draw_limb(line, 4, limb->top[lane], limb->end[lane], whole, out->visible[l].word[word]);
+            draw_limb(line, LAYERS_LINES, limb->top[lane], limb->end[lane], whole,
+                      out->visible[l].word[word]);
     }
 }
 
