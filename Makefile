@@ -75,7 +75,7 @@ endif
 GCC   := $(if $(findstring clang,$(shell $(CC) --version 2>/dev/null)),,gcc)
 TIGHT := $(if $(GCC),$(GCC_TIGHT))
 SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
-LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
+LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT) $(if $(GCC),$(GCC_LEAST)))
 SMALL_VECTOR := $(if $(SMALL),$(SMALL) $(if $(GCC),$(GCC_VECTOR),$(CLANG_VECTOR)))
 LESS := $(if $(SMALL),$(if $(GCC),$(GCC_LESS) $(if $(findstring aarch64,$(MACHINE)),$(GCC_AARCH64))))
 # Flags of a source by its file name; kernels and other sources differ where no list names them.

@@ -12,6 +12,7 @@ set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS flags.mk include/
 if(NOT CMAKE_C_COMPILER_ID STREQUAL GNU)
   set(GCC_VECTOR ${CLANG_VECTOR} -Wno-pass-failed)
   unset(GCC_TIGHT)
+  unset(GCC_LEAST)
   unset(GCC_KERNEL)
   unset(GCC_LESS)
   unset(GCC_LESS_avx2)
@@ -27,7 +28,7 @@ set(kernel_flags_O3 ${GCC_KERNEL})
 set(flags_VECTOR -O2 ${GCC_TIGHT} ${GCC_VECTOR})
 set(flags_LESS ${flags_VECTOR} ${GCC_LESS})
 set(flags_O2 -O2 ${GCC_TIGHT})
-set(flags_OS -Os ${GCC_TIGHT})
+set(flags_OS -Os ${GCC_TIGHT} ${GCC_LEAST})
 
 # gait_objects(NAME SOURCES LEVEL OPTIONS...): the objects of sources compiled alike, if there are any.
 function(gait_objects name sources level)
