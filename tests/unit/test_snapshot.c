@@ -195,6 +195,7 @@ static void test_implausible(gait_tracker *t)
     SPOIL(c->stature_sd_ratio, float, NAN, INFINITY, -0.1f);
     SPOIL(c->front_back_margin, float, NOT_FINITE);
     SPOIL(c->left_right_margin, float, NOT_FINITE);
+    SPOIL(c->fit_margin, float, NOT_FINITE);
     SPOIL(c->map[0].scale, float, NAN, -1.0f, 3.0f);
     SPOIL(c->map[0].u0, float, TOO_LARGE);
     SPOIL(c->map[0].v0, float, TOO_LARGE);

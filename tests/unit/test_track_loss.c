@@ -1,6 +1,7 @@
 /* Track loss and recovery: an empty scene, an occluded person, reappearance where expected or elsewhere. */
 #include "tracker/track_loss.h"
 
+#include "tracker/fit_check.h"
 #include "tracker/front_back.h"
 #include "kernel_check.h"
 #include "base/fmath.h"
@@ -212,6 +213,50 @@ static void test_front_back(void)
     toy_tracker_free(t);
 }
 
+/* The images prefer the estimate to different bodies, and nothing but it.  The running mean decides, and recovers. */
+static void test_fit(void)
+{
+    gait_tracker *const t = begin();
+    gait_estimate e;
+    for (int n = 0; n < 30; n++) {
+        show(t, n, n, &e);
+        CHECK(t->core->fit_margin >= 0.0f && e.status == GAIT_TRACK_TRACKING);
+    }
+    particle_state const right = particle_from_state(&t->layout, &e.mean);
+    particle_state turned = right, late = right;
+    turned.f[F_HEADING] = m_wrap_pi(right.f[F_HEADING] + PI_F / 3.0f);
+    late.f[F_PHASE] = m_wrap1(right.f[F_PHASE] - 0.25f);
+    CHECK(fit_check_score(t, &t->layout, &right) > 1.0f);
+    CHECK(fit_check_score(t, &t->layout, &turned) < -1.0f && fit_check_score(t, &t->layout, &late) < -1.0f);
+    t->core->fit_margin = -0.5f;
+    show(t, 30, 30, &e);
+    CHECK(t->core->fit_margin < 0.0f && e.status == GAIT_TRACK_AMBIGUOUS);
+    for (int n = 31; n < 60; n++)
+        show(t, n, n, &e);
+    CHECK(t->core->fit_margin >= 0.0f && e.status == GAIT_TRACK_TRACKING);
+    toy_tracker_free(t);
+}
+
+/* One bad frame in a row of good ones changes little, a row of bad ones much. */
+static void test_fit_is_averaged(void)
+{
+    gait_tracker *const t = begin();
+    gait_estimate e;
+    for (int n = 0; n < 30; n++)
+        show(t, n, n, &e);
+    particle_state const right = particle_from_state(&t->layout, &e.mean);
+    particle_state turned = right;
+    turned.f[F_HEADING] = m_wrap_pi(right.f[F_HEADING] + PI_F / 3.0f);
+    t->core->support_utime = t->core->utime - 40000;
+    float const good = t->core->fit_margin, once = fit_check_update(t, false, &t->layout, &turned);
+    CHECK(once > 0.0f && once < good);
+    for (int n = 0; n < 25; n++)
+        t->core->fit_margin = fit_check_update(t, false, &t->layout, &turned);
+    CHECK(t->core->fit_margin < 0.0f);
+    CHECK(fit_check_update(t, true, &t->layout, &turned) > 0.0f);
+    toy_tracker_free(t);
+}
+
 /* The likelihood of no particle is below that of a hidden person. */
 static void test_the_bound(void)
 {
@@ -275,6 +320,8 @@ int main(void)
     test_elsewhere();
     test_belt();
     test_front_back();
+    test_fit();
+    test_fit_is_averaged();
     test_the_bound();
     return CHECK_DONE();
 }

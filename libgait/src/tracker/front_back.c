@@ -30,12 +30,14 @@ bool front_back_visible(const gait_tracker *t, const particle_state *p)
 /* The body in the first lane; in the others the body turned by 180 degrees, at evenly spaced phases. */
 static void turned_bodies(const particle_state *p, particle_block *out)
 {
-    for (int32_t f = 0; f < F_MAX; f++)
-        for (int32_t lane = 0; lane < BLOCK; lane++)
-            out->f[f][lane] = p->f[f];
-    for (int32_t lane = 1; lane < BLOCK; lane++) {
-        out->f[F_PHASE][lane] = m_wrap1(p->f[F_PHASE] + (float)lane / (float)(BLOCK - 1));
-        out->f[F_HEADING][lane] = m_wrap_pi(p->f[F_HEADING] + PI_F);
+    particle_set all = {.n = BLOCK, .fields = F_MAX, .value = out->f[0]};
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        particle_state one = *p;
+        if (lane > 0) {
+            one.f[F_PHASE] = m_wrap1(p->f[F_PHASE] + (float)lane / (float)(BLOCK - 1));
+            one.f[F_HEADING] = m_wrap_pi(p->f[F_HEADING] + PI_F);
+        }
+        particle_put(&all, lane, &one);
     }
 }
 

@@ -88,7 +88,8 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
     ok &= c.rejuvenation_utime <= c.utime && c.rejuvenation_utime >= c.start_utime;
     ok &= c.usual_unexplained >= 0.0f && c.usual_unexplained < 1e9f && c.stature_sd_ratio >= 0.0f &&
           c.stature_sd_ratio < 1e9f;
-    ok &= f_finite(&c.front_back_margin, 1) && f_finite(&c.left_right_margin, 1);
+    ok &=
+        f_finite(&c.front_back_margin, 1) && f_finite(&c.left_right_margin, 1) && f_finite(&c.fit_margin, 1);
     for (int32_t k = 0; k < t->cfg.cameras; k++) {
         const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};
         ok &= moderate(map, 3) && map[0] >= 0.0f && map[0] <= 2.0f;

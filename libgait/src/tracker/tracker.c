@@ -5,6 +5,7 @@
 #include "tracker/class_strata.h"
 #include "tracker/estimate.h"
 #include "tracker/features_step.h"
+#include "tracker/fit_check.h"
 #include "tracker/fixed_lag.h"
 #include "tracker/front_back.h"
 #include "tracker/hypotheses.h"
@@ -293,6 +294,7 @@ static void check_estimate(gait_tracker *t, float dt, bool lost, const state_lay
         hypotheses_acquire(t);
     core->front_back_margin = front_back_update(t, lost || !core->found, of, mean);
     core->left_right_margin = left_right_update(t, lost || !core->found, of, mean);
+    core->fit_margin = fit_check_update(t, lost || !core->found, of, mean);
     core->support_utime = core->utime;
     core->last_supported = *mean;
     if (t->classes)
@@ -315,7 +317,7 @@ static gait_track_status status_of(const gait_tracker *t, float dt, const gait_e
     if (e->hypothesis_weight < DOMINANT_WEIGHT)
         return seconds_since(t, core->start_utime) < SETTLE_TIME ? GAIT_TRACK_INIT : GAIT_TRACK_AMBIGUOUS;
     bool const sides_open = !still && (hypotheses_open(t) || core->left_right_margin < 0.0f);
-    bool const open = sides_open || core->front_back_margin < 0.0f || departs;
+    bool const open = sides_open || core->front_back_margin < 0.0f || core->fit_margin < 0.0f || departs;
     return open ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;
 }
 

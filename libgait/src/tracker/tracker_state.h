@@ -38,6 +38,7 @@ typedef struct tracker_core {
     float usual_unexplained; /* foreground that the estimate usually leaves unexplained, nats */
     float front_back_margin; /* running mean of front_back_score() */
     float left_right_margin; /* running mean of the keypoints' evidence against the mirror image */
+    float fit_margin;        /* running mean of fit_check_score() */
     double ess;
     hypotheses_state hypotheses;
     particle_state last_supported;       /* the estimate when an image last supported it */
