@@ -315,7 +315,7 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
     PAPER("Time for which errors of the image terms persist; closer frames count less; 0: all count in full.",        \
           float, evidence_time, , "seconds", 0.1, 0, 0, 1e6)                                                          \
     PAPER("Time constant after which particles no longer depend on one ancestor; 0: no rejuvenation.",                \
-          float, rejuvenation_time, , "seconds", 1.5, 0, 0, 1e6)                                                      \
+          float, rejuvenation_time, , "seconds", 0.15, 0, 0, 1e6)                                                     \
     PAPER("Model error, added in quadrature to the reported joint_sd.",                                               \
           float, joint_sd_model, , "statures", 0.015, 0, 0, 1)                                                        \
     /* ---- advanced settings: dynamics (eqs. 5-9): standard deviations of random walks, time constants ---- */       \

@@ -101,6 +101,21 @@ static void test_mean_and_covariance_remain(void)
     CHECK_NEAR(shared / N / variance, 0.082, 0.06);
 }
 
+/* However much time has passed, particles keep half of what they were and do not become copies of others. */
+static void test_half_remains(void)
+{
+    particle_set const from = normal_crowd(&first);
+    double const stature = mean(&first, F_STATURE), variance = covariance(&first, F_STATURE, F_STATURE);
+    rejuvenation const m = after(&from, &first, 100.0f, 0);
+    double shared = 0.0;
+    rejuvenate_all(&m, &second);
+    for (int32_t i = 0; i < N; i++)
+        shared += ((double)first.value[F_STATURE * N + i] - stature) *
+                  ((double)second.value[F_STATURE * N + i] - stature);
+    CHECK_NEAR(shared / N / variance, 0.5, 0.05);
+    CHECK_NEAR(covariance(&second, F_STATURE, F_STATURE) / variance, 1.0, 0.15);
+}
+
 static void test_angles_go_the_short_way(void)
 {
     particle_set const from = normal_crowd(&first);
@@ -173,6 +188,7 @@ int main(void)
 {
     test_lanes_beyond_repeat_the_last();
     test_mean_and_covariance_remain();
+    test_half_remains();
     test_angles_go_the_short_way();
     test_others_are_drawn_by_weight();
     test_hypotheses_are_rejuvenated_separately();

@@ -2,9 +2,11 @@
 #include "base/fmath.h"
 #include "base/rng.h"
 
+static const float MOST_SHRINK = 0.5f; /* beyond, particles would become copies of others again */
+
 COLD void rejuvenation_set(rejuvenation *m, float seconds, float time)
 {
-    m->shrink = time > 0.0f ? 1.0f - m_exp(-seconds / time) : 0.0f;
+    m->shrink = time > 0.0f ? f_min(1.0f - m_exp(-seconds / time), MOST_SHRINK) : 0.0f;
     m->noise = __builtin_sqrtf(m->shrink * (1.0f - m->shrink));
 }
 

@@ -6,8 +6,8 @@
  *
  * | x' = x + a (m - x) + sqrt(a (1 - a)) (j - k)
  *
- * with m, j and k particles drawn by weight. The mean and the covariance of the particle set stay as they
- * were (shrinkage of Liu and West 2001; their kernel drawn as a difference of particles, ter Braak 2006). */
+ * with m, j and k particles drawn by weight, and a at most 1/2. The mean and the covariance of the particle set stay
+ * as they were (shrinkage of Liu and West 2001; their kernel drawn as a difference of particles, ter Braak 2006). */
 #ifndef GAIT_FILTER_REJUVENATION_H
 #define GAIT_FILTER_REJUVENATION_H
 #include "filter/dynamics.h"
