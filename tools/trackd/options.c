@@ -13,8 +13,8 @@ static bool set_number(const option *o, const char *text, message *why)
     char *end;
     errno = 0;
     double const value = strtod(text, &end);
-    bool const whole = o->kind != OPTION_INT || value == (double)(int32_t)value;
-    if (end == text || *end || !(value >= o->low && value <= o->high) || !whole)
+    bool const fits = value >= o->low && value <= o->high; /* false for NaN */
+    if (end == text || *end || !fits || (o->kind == OPTION_INT && value != (double)(int32_t)value))
         return message_set(why,
                            o->kind == OPTION_INT ? "--%s %s: give a whole number from %.0f to %.0f"
                                                  : "--%s %s: give a number from %g to %g",
