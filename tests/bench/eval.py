@@ -169,6 +169,9 @@ def tables(
     summaries = eval_table.summaries(rows)
     parts = [("Clips", shape(eval_table.grid(summaries), 2))]
     parts.append(("Intervals and status", shape(eval_table.honesty(summaries), 2)))
+    by_particles = eval_table.by_particles(rows, TrackerConfig.default().particles)
+    if len(by_particles) > 1:
+        parts.append(("Errors and time by number of particles", shape(by_particles, 0)))
     costs = eval_ablate.costs(rows)
     if costs:
         parts.append(

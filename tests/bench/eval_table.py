@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import table
 from eval_measures import lost_at_end
+from eval_plan import BASE
 from eval_run import Result
 
 MEDIAPIPE = {  # MediaPipe Pose 0.10.21, 12 joints root-aligned, mm: ../shared/data/README.md
@@ -189,6 +190,35 @@ def grid(rows: list[dict[str, Any]]) -> list[list[str]]:
         for s in rows
     ]
     return [head, *lines]
+
+
+def by_particles(rows: list[dict[str, Any]], default: int) -> list[list[str]]:
+    """Head and lines of errors and time by number of particles; only the head if that was not varied.
+
+    Means over the clips with true joints of the means over their seeds, with standard errors over the seeds.
+    """
+    shown = {"root mm": ("root_mm", 1), "abs mm": ("abs_mm", 0), "in 90 %": ("cover90", 3)}
+    shown |= {"CRPS mm": ("crps_mm", 1), "px": ("px", 2), "ms": ("step_ms", 1)}
+    lines = [["particles", "runs", *shown]]
+    arms = {row["arm"]: int(row["arm"][2:]) for row in rows if row["arm"].startswith("N ")}
+    if arms:
+        arms[BASE] = default
+    for arm, count in sorted(arms.items(), key=lambda item: item[1]):
+        runs = [row for row in rows if row["arm"] == arm and row["root_mm"] is not None]
+        if runs:
+            means = [_over_clips(runs, name, decimals) for name, decimals in shown.values()]
+            lines.append([str(count), str(len(runs)), *means])
+    return lines
+
+
+def _over_clips(runs: list[dict[str, Any]], name: str, decimals: int) -> str:
+    names = dict.fromkeys(row["clip"] for row in runs)
+    clips = [[row[name] for row in runs if row["clip"] == clip] for clip in names]
+    mean = np.mean([np.mean(values) for values in clips])
+    if any(len(values) < 2 for values in clips):
+        return f"{mean:.{decimals}f}"
+    error = np.sqrt(sum(np.var(values, ddof=1) / len(values) for values in clips)) / len(clips)
+    return f"{mean:.{decimals}f} +- {error:.{decimals}f}"
 
 
 def honesty(rows: list[dict[str, Any]]) -> list[list[str]]:

@@ -20,6 +20,7 @@ import eval_clips
 import eval_edits
 import eval_measures
 import eval_plan
+import eval_table
 import eval_wanted
 import mutants
 import parts
@@ -169,6 +170,18 @@ def test_ablation_is_paired_and_its_interval_knows_noise_from_effect():
     assert {line["name"]: line["root_mm"] for line in eval_ablate.changes(rows, later)} == {
         arm: pytest.approx((-3, -3, -3)) for arm in (eval_plan.BASE, "no edges", "no tilt")
     }
+
+
+def test_errors_and_time_by_number_of_particles_are_means_over_clips():
+    rows = [row("a", seed, step_ms=3.0, root_mm=error) for seed, error in ((1, 29.0), (2, 31.0))]
+    assert len(eval_table.by_particles(rows, 2000)) == 1  # nothing was varied
+    rows += [row("outdoor", step_ms=9.0, root_mm=None)]
+    rows += [row("a", seed, "N 500", step_ms=1.0, root_mm=32.0) for seed in (1, 2, 3)]
+    rows += [row("b", 1, "N 500", step_ms=2.0, root_mm=52.0)]
+    head, few, many = eval_table.by_particles(rows, 2000)
+    few, many = (dict(zip(head, line, strict=True)) for line in (few, many))
+    assert (few["particles"], few["runs"], few["root mm"], few["ms"]) == ("500", "4", "42.0", "1.5")
+    assert (many["particles"], many["root mm"], many["ms"]) == ("2000", "30.0 +- 1.0", "3.0 +- 0.0")
 
 
 def test_switches_turn_off_what_is_on():

@@ -105,7 +105,7 @@ def test_people_who_cross_keep_their_trackers(streams):
 
 
 def test_people_together_are_tracked_the_same_on_every_run_and_better_than_alone(streams, tmp_path):
-    """One hides the other, whose foreground would otherwise be missed; the error lasts if rejuvenation is slow."""
+    """One hides the other, whose foreground would otherwise be missed: an error that lasts if it is slow."""
     slow = ["--rejuvenation-time", "1.5"]
     events = [(e.channel, e.data) for e in lcm.EventLog(str(streams[1]), "r")]
     last = next(k for k, (_, data) in enumerate(events) if data == image(WALK).encode())
