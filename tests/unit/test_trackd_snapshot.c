@@ -388,6 +388,26 @@ static void test_own(void)
     s.state = GAITMSG_STATUS_T_RUNNING;
 }
 
+/* Of two daemons with one file the first to notice leaves it to the other. */
+static void test_two_writers(void)
+{
+    snapshot_file f = {.path = path}, other = {.path = path};
+    struct timespec const long_ago[2] = {{0}};
+    for (int i = 0; i < 2; i++) { /* the time of a file alone shows nothing */
+        snapshot_file_write(&f, &s, true);
+        CHECK(utimensat(AT_FDCWD, path, long_ago, 0) == 0 && f.path);
+    }
+    snapshot_file_write(&other, &s, true);
+    CHECK(utimensat(AT_FDCWD, path, long_ago, 0) == 0);
+    s.state = GAITMSG_STATUS_T_READY;
+    snapshot_file_write(&f, &s, true);
+    CHECK(!f.path && access(path, F_OK) == 0);
+    s.state = GAITMSG_STATUS_T_RUNNING;
+    snapshot_file_write(&other, &s, true);
+    CHECK(other.path && other.own);
+    unlink(path);
+}
+
 int main(void)
 {
     start();
@@ -402,6 +422,7 @@ int main(void)
     test_working_folder();
     test_leftovers();
     test_own();
+    test_two_writers();
     test_large();
     unlink(path);
     unlink(model);

@@ -244,12 +244,28 @@ bool snapshot_file_check(const snapshot_file *f, message *why)
     return true;
 }
 
+/* Whether another program has replaced the file since it was written here: neither a new time alone shows it nor, as some
+ * file systems make one for every look, a new number. */
+static bool is_replaced(const snapshot_file *f)
+{
+    const struct stat *const own = &f->written;
+    struct stat is;
+    return own->st_ino && lstat(f->path, &is) == 0 && is.st_ino != own->st_ino &&
+           (is.st_mtim.tv_sec != own->st_mtim.tv_sec || is.st_mtim.tv_nsec != own->st_mtim.tv_nsec);
+}
+
 void snapshot_file_write(snapshot_file *f, const service *s, bool at_once)
 {
     int64_t const now = clock_monotonic();
     if (!f->path || (!at_once && now < f->due))
         return;
     f->due = now + f->period;
+    if (is_replaced(f)) {
+        log_line("--snapshot %.160s: another program writes it, too; give each its own", f->path);
+        f->path = NULL;
+        return;
+    }
+    f->written.st_ino = 0;
     if (!anyone(s)) {
         if (f->own)
             unlink(f->path);
@@ -264,6 +280,8 @@ void snapshot_file_write(snapshot_file *f, const service *s, bool at_once)
         log_line("--snapshot %.160s: cannot be written: %s", f->path, strerror(fault));
     f->failed = fault != 0;
     f->own = f->own || !fault;
+    if (!fault && lstat(f->path, &f->written) != 0)
+        f->written.st_ino = 0;
 }
 
 /* ---- reading ---- */
