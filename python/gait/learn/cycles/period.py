@@ -54,7 +54,8 @@ class Folder:
         mean = np.where(visible, signals, 0).sum(axis=0) / np.maximum(self.total, 1)
         values = np.where(visible, signals - mean, 0)
         self.squares = (values**2).sum(axis=0)
-        masks, self.mask = np.unique(visible, axis=1, return_inverse=True)  # usually the same for all angles
+        masks, inverse = np.unique(visible, axis=1, return_inverse=True)  # usually the same for all angles
+        self.mask = inverse.ravel()  # of two dimensions with numpy 2.0.0
         self.stacked = np.concatenate([values, masks.astype(float)], axis=1)
 
     def literal(self, periods: ArrayLike) -> Floats:
