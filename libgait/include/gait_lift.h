@@ -196,7 +196,8 @@ typedef struct gait_lift_frame { GAIT_LIFT_FRAME_FIELDS(GAIT_DECLARE) } gait_lif
  * first frame on; each frame is added, at its own time (linear between their frames), to the segments that contain
  * it.  Points far from their prediction are down-weighted. */
 GAIT_API gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err);
-/* Estimate of the frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: fewer frames since the start. */
+/* Estimate of the frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: fewer frames since the start;
+ * GAIT_ERR_NUMERIC: as of gait_lift_positions(). */
 GAIT_API gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out, gait_error *err);
 /* Forget the stream. */
 GAIT_API void        gait_lift_reset(gait_lift *l);

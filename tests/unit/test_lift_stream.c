@@ -359,6 +359,34 @@ static void test_out_of_range(double tiny, double threshold)
     CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && error_of(&out, &worst) < 0.1);
 }
 
+/* A person without size of whom one point is seen far more exactly than rounding: an estimate is finite, or there is none. */
+static void test_absurd(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_ORTHOGRAPHIC);
+    c.stature = 1e-38;
+    c.stature_sd = -1.0;
+    c.heading_sd = 0.3;
+    c.place_sd[0] = 22.55;
+    gait_lift *const l = toy_lift_open(&c);
+    int refused = 0;
+    for (int i = 0; i < 20; i++) {
+        double sum = 0.0;
+        for (int j = 0; j < TOY_MARKERS; j++) {
+            uv[2 * j] = j == 5 ? 1e-38 : 24.0 + j % 7;
+            uv[2 * j + 1] = j == 5 ? 1e-38 : 8.0 + j % 13;
+            sds[j] = j == 5 ? (i == 3 ? 1e-50 : 1e-38) : 2.0;
+        }
+        gait_result const pushed = gait_lift_push(l, 1 + 50000 * (int64_t)(i + 1), uv, sds, NULL);
+        CHECK(pushed == GAIT_OK || pushed == GAIT_ERR_NUMERIC);
+        gait_result const s = gait_lift_estimate(l, &out, NULL);
+        for (int k = 0; k < 3 * TOY_MARKERS; k++)
+            sum += fabs(out.marker[k / 3][k % 3]) + fabs(out.sd[k / 3][k % 3]);
+        CHECK(s == GAIT_ERR_STATE || (s == GAIT_OK) == (bool)isfinite(sum));
+        refused += s == GAIT_ERR_NUMERIC;
+    }
+    CHECK(refused > 0);
+}
+
 /* Hash of every estimate of the film. */
 static uint64_t digest(uint32_t mask)
 {
@@ -387,6 +415,7 @@ static void tests(void)
     test_clutter();
     test_known_heading();
     test_second_component();
+    test_absurd();
     test_out_of_range(1e-200, 9.0);
     test_out_of_range(1e-153, 0.0);
     test_noise();

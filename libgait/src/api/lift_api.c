@@ -267,6 +267,14 @@ static gait_result need_segment(bool there, const char *function, gait_error *er
                              function);
 }
 
+static bool are_finite(const double *mean, const double *sd, size_t points)
+{
+    bool ok = true;
+    for (size_t i = 0; i < 3 * points; i++)
+        ok &= fabs(mean[i]) <= DBL_MAX && fabs(sd[i]) <= DBL_MAX;
+    return ok;
+}
+
 gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_error *err)
 {
     if (!l || !mean)
@@ -274,12 +282,11 @@ gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_err
     gait_result const s = need_segment(l->fitted, "gait_lift_positions", err);
     if (s != GAIT_OK)
         return s;
-    bool finite = true;
     for (int32_t f = 0; f < l->table.prior.frames; f++)
         read_frame(l, &l->posterior, f, true, mean, sd);
-    for (size_t i = 0; i < 3 * points_of(&l->table); i++)
-        finite &= fabs(mean[i]) <= DBL_MAX && (!sd || fabs(sd[i]) <= DBL_MAX);
-    return finite ? GAIT_OK : out_of_range("gait_lift_positions", "the last segment is", err);
+    return are_finite(mean, sd ? sd : mean, points_of(&l->table))
+               ? GAIT_OK
+               : out_of_range("gait_lift_positions", "the last segment is", err);
 }
 
 int32_t gait_lift_unknowns(const gait_lift *l)
@@ -401,6 +408,8 @@ gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out, gait_error *e
         return base_fail(err, GAIT_ERR_STATE, -1,
                          "gait_lift_estimate: no frame of %d frames ago; push more, or lower config lag",
                          (int)l->table.cfg.lag);
+    if (!are_finite(out->marker[0], out->sd[0], (size_t)l->table.prior.markers))
+        return out_of_range("gait_lift_estimate", "observations are", err);
     return GAIT_OK;
 }
 
