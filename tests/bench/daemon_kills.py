@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """gait-trackd killed at random moments: what is lost, and how long the next daemon needs to continue.
 
-    daemon_kills.py [--kills 200] [--record]
+    daemon_kills.py [--kills 200] [--real-time] [--record]
 
 A stream of 30 frames a second of a drawn person; at random times a SIGKILL, after which another daemon is
 started at once on the same snapshot, as systemd does by the unit.  A daemon has continued if it reports that
@@ -9,8 +9,9 @@ it follows the person from a frame and estimates follow without a START.  Time c
 frame is lost if it was sent and no daemon estimated it.  Then the same with --people 2, two trackers of the
 same person with keypoints.  No other program may publish on the URL.
 
-A busy machine delays everyone.  The table therefore also has, of the slowest case, how long the daemon waited
-for a processor (its thread that waited longest), and how late the frames were sent.
+A busy machine delays everyone; --real-time, as root, gives the daemon priority (howto/live.md).  The table
+therefore also has, of the slowest case, how long the daemon waited for a processor (its thread that waited
+longest), and how late the frames were sent.
 """
 
 from __future__ import annotations
@@ -90,9 +91,11 @@ def main() -> int:
     """Kill, measure, print; exit code 1 if a daemon did not continue."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--kills", type=int, default=200)
+    options.add_argument("--real-time", action="store_true")
     options.add_argument("--record", action="store_true")
     args = options.parse_args()
-    rows = [[people, args.kills, *attacked(people, args.kills)] for people in (1, 2)]
+    before = ["chrt", "-r", "10"] if args.real_time else []
+    rows = [[people, args.kills, *attacked(people, args.kills, before)] for people in (1, 2)]
     head = ["people", "kills", "went on", "ms median", "ms 90 %", "ms most", "frames lost, median", "most"]
     head += ["slowest: ms waited for a processor", "ms frames late"]
     title = "A daemon that is killed"
@@ -112,8 +115,11 @@ def main() -> int:
     return int(any(row[2] < args.kills for row in rows))
 
 
-def attacked(people: int, kills: int) -> list[float]:
-    """Daemons that continued; milliseconds: median, 90 %, most; frames lost: median, most; delays."""
+def attacked(people: int, kills: int, before: list[str]) -> list[float]:
+    """Kill daemons whose command begins with `before`.
+
+    Daemons that continued; milliseconds: median, 90 %, most; frames lost: median, most; delays.
+    """
     chance, url = random.Random(1), private_url()
     back_ms: list[float] = []
     delays_ms: list[tuple[float, float]] = []
@@ -121,13 +127,13 @@ def attacked(people: int, kills: int) -> list[float]:
     with tempfile.TemporaryDirectory(dir=MEMORY) as folder:
         several = ["--keypoints-term", "--people", people] if people > 1 else []
         snapshot = ["--snapshot", f"{folder}/state", "--snapshot-s", PERIOD_S]
-        words = rig.command("--url", url, "--init", "auto", *snapshot, *several)
+        words = before + rig.command("--url", url, "--init", "auto", *snapshot, *several)
         stream, log = Stream(url, people), Path(folder) / "log"
         daemon = start(words, log)
         begin(stream)
         for _ in range(kills):
             stream.run(time.monotonic() + chance.uniform(1.2, 3.0))
-            before, began, stream.late = log.read_text(), time.monotonic(), 0.0
+            printed, began, stream.late = log.read_text(), time.monotonic(), 0.0
             daemon.send_signal(signal.SIGKILL)
             daemon.wait()
             following = stream.sent  # only the next daemon can answer this frame
@@ -139,7 +145,7 @@ def attacked(people: int, kills: int) -> list[float]:
             resumed = len(RESUMED.findall(log.read_text())) == people
             if first is None or not resumed:
                 print(
-                    f"daemon_kills: the daemon did not continue:\n{before}--\n{log.read_text()}",
+                    f"daemon_kills: the daemon did not continue:\n{printed}--\n{log.read_text()}",
                     file=sys.stderr,
                 )
                 begin(stream)
