@@ -290,6 +290,8 @@ def test_what_no_number_of_frames_makes_less_is_added_as_the_library_does():
     assert tracker.start_stature_sd > 0.05
     np.testing.assert_allclose(ours.joint_sd, theirs.joint_sd, rtol=0.02)
     np.testing.assert_allclose(ours.sd.stature, theirs.sd.stature, rtol=0.02)
+    # Three tenths of the variance of the filter's phase are errors that return with every stride.
+    np.testing.assert_allclose(ours.sd.phase, np.sqrt(1.3) * theirs.sd.phase, rtol=0.05)
 
 
 @pytest.fixture(scope="module")

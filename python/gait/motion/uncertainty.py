@@ -54,7 +54,7 @@ _LASTING_PHASE_SHARE = 0.6  # share of the variance of the phase that lasts
 #: simulate` who are in no reported result (decisions.md).
 _FOOT = np.array([[1.0, 0.95, 0.65], [0.5, 0.45, 0.35], [0.25, 0.25, 0.25]])
 _BY_WAVE = np.repeat(_FOOT, (1, 2, 2), axis=0)
-_STRIKE_SD, _OFF_SD = 0.010, 0.022
+_STRIKE_SD, _OFF_SD = 0.008, 0.022
 _SMOOTH_S = 0.12  # duration over which errors within a stride are smooth
 _SIZE_SHARE = 0.7  # error of the size over the person's part of a joint: many joints determine the size
 
@@ -68,8 +68,9 @@ def draw_contacts(
         return nothing, _event_sd([events], unknown=True), "unknown: the track has no column phase_sd"
     drawn: dict[str, list[Contacts]] = {side: [] for side in STRIKE_SIDES}
     found, random = [], np.random.default_rng(1)
+    common = _lasting_phase_sd(track, draws)
     for motion in _motions(track, draws):
-        found.append(_shifted(same_events(find_events(motion), events), stride, random))
+        found.append(_shifted(same_events(find_events(motion), events), stride, common, random))
         for side in STRIKE_SIDES:
             drawn[side].append(contacts(motion, found[-1], side, stride))
     source = "the standard deviations of each frame, whose errors persist over frames"
@@ -81,14 +82,25 @@ def draw_contacts(
     return {side: stack(drawn[side]) for side in STRIKE_SIDES}, _event_sd(found), source
 
 
-def _shifted(events: Events, stride: float, random: np.random.Generator) -> Events:
-    """Shift all strikes of a foot alike, and all its toe-offs: the person's part of their errors."""
+def _shifted(events: Events, stride: float, common: float, random: np.random.Generator) -> Events:
+    """Shift all events alike, with sd `common` (strides), and each foot's strikes and toe-offs by its own."""
+    late = common * random.standard_normal()
     return Events(
         *(
-            {side: times + stride * sd * random.standard_normal() for side, times in kind.items()}
+            {side: times + stride * (late + sd * random.standard_normal()) for side, times in kind.items()}
             for kind, sd in ((events.strike, _STRIKE_SD), (events.off, _OFF_SD))
         )
     )
+
+
+def _lasting_phase_sd(track: Track, draws: Draws | None) -> float:
+    """Return the standard deviation of the phase, strides, that the track states beyond its draws."""
+    if draws is None or "phase_sd" not in track.numbers:
+        return 0.0
+    length = np.abs(np.exp(2j * np.pi * draws.phase).mean(axis=0))
+    drawn = -2 * np.log(np.clip(length, 1e-6, 1.0)) / (2 * np.pi) ** 2
+    beyond = track.numbers["phase_sd"] ** 2 - drawn
+    return float(np.sqrt(np.maximum(np.nanmedian(beyond), 0.0))) if np.isfinite(beyond).any() else 0.0
 
 
 def _motions(track: Track, draws: Draws | None) -> Iterator[Joints]:

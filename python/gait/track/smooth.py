@@ -42,6 +42,9 @@ _FEWEST = 4  # pairs for each number that varies, from which its regression is t
 _GROUP = (0.25, 0.8)  # strides and radians within which motions and particles belong together
 _SAME_HYPOTHESIS = (0.15, 0.5)  # strides and radians around a hypothesis, as in estimate.c
 _SIZE_SD = 0.01  # relative sd of the size that pictures determine at best, as in estimate.c
+#: Share of the variance of the filter's phase that more frames do not reduce, because errors of the images
+#: return with every stride, and the greatest sd of that phase, strides, if there is one hypothesis.
+_LASTING_PHASE, _ONE_PHASE = 0.3, 0.05
 #: Least weight of the dominant hypothesis with status `tracking`: DOMINANT_WEIGHT of estimate.h.
 _DOMINANT_WEIGHT = 0.7
 
@@ -326,12 +329,13 @@ class Smoother:
     def _widened(self, index: int, now: Estimate) -> Estimate:
         """Add to a frame's standard deviations the errors that more frames do not reduce, as estimate.c does.
 
-        These are what the model cannot express and, with one camera, the uncertain size of the person.
+        These are what the model cannot express, a part of the error of the phase and, with one camera, the
+        uncertain size of the person.
         """
         tracker, start_sd = self._tracker, self._stature_sd[index]
         share, one_view = tracker.config.joint_sd_model, len(tracker.cameras) == 1
         size = _SIZE_SD * start_sd / np.hypot(_SIZE_SD, start_sd) if one_view and share > 0 else 0.0
-        frame = self._filtered[index][0]
+        frame, then = self._filtered[index]
         ways = now.joints - frame.camera(tracker.cameras[0]).centre
         pose_variance = np.zeros((len(ways), 1))
         if frame.pose is not None:
@@ -342,7 +346,10 @@ class Smoother:
             now.joint_sd**2 + (share * now.mean.stature) ** 2 + (size * ways) ** 2 + pose_variance
         )
         stature = float(np.hypot(now.sd.stature, size * now.mean.stature))
-        return replace(now, joint_sd=joint_sd, sd=replace(now.sd, stature=stature, pelvis=joint_sd[0]))
+        lasting = np.sqrt(_LASTING_PHASE) * min(then.sd.phase, _ONE_PHASE) if share > 0 else 0.0
+        phase = float(np.hypot(now.sd.phase, lasting))
+        sd = replace(now.sd, phase=phase, stature=stature, pelvis=joint_sd[0])
+        return replace(now, joint_sd=joint_sd, sd=sd)
 
 
 def smoothed(
