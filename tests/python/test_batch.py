@@ -174,14 +174,17 @@ def test_clips_are_counted_not_people(place, monkeypatch, capsys):
     assert capsys.readouterr().out.startswith("1 clip, 0 failed")
 
 
-def test_several_films_are_one_clip_and_all_their_files_count(place, capsys):
-    """gait track takes these words, and fails because the films have a few bytes only."""
+@pytest.mark.parametrize("make", ["track", "lift"])
+def test_several_films_are_one_clip_and_all_their_files_count(place, capsys, make):
+    """gait track and gait lift take these words, and fail because the films have a few bytes only."""
     (place / "calib.json").write_text("{}")
-    text = '[[clip]]\nvideos = ["a.mp4", "b.mp4"]\ncameras = ["calib.json", "calib.json"]\nmake = ["track"]\n'
+    text = (
+        f'[[clip]]\nvideos = ["a.mp4", "b.mp4"]\ncameras = ["calib.json", "calib.json"]\nmake = ["{make}"]\n'
+    )
     [clip] = clips_of(place, text)
     words = clip.command(place)
     films, camera = [str(place / "a.mp4"), str(place / "b.mp4")], ["--camera", str(place / "calib.json")]
-    assert clip.name == "a" and words[1:3] == films and words[-4:] == 2 * camera
+    assert clip.name == "a" and words[0] == make and words[1:3] == films and words[-4:] == 2 * camera
     before = clip.key()
     (place / "b.mp4").write_bytes(b"another")
     assert clip.key() != before
@@ -314,8 +317,8 @@ def test_an_interrupt_ends_the_commands(place):
         ("[[clip]]\nvideos = 'a.mp4'\nheight = 1.7\n", r"videos is not a list.*left.mp4"),
         ("[[clip]]\nvideo = 'a.mp4'\nvideos = ['b.mp4']\nheight = 1.7\n", "videos is given beside video"),
         (
-            "[[clip]]\nvideos = ['a.mp4', 'b.mp4']\nheight = 1.7\nmake = ['lift']\n",
-            "videos cannot be combined with lift",
+            "[[clip]]\nvideos = ['a.mp4', 'b.mp4']\nkeypoints = 'k.csv'\nheight = 1.7\n",
+            "videos cannot be combined with keypoints",
         ),
         (
             "[defaults]\nstop = 9\n[[clip]]\nkeypoints = 'k.json'\nmake = ['lift']\n",

@@ -102,15 +102,8 @@ class Clip:
         return [*words, *self.options]
 
     def _lift(self, result: str) -> list[str]:
-        words = [
-            "lift",
-            self.keypoints or self.video or "",
-            "-o",
-            result,
-            "--json",
-            "--quiet",
-            *self._common(),
-        ]
+        given = [self.keypoints] if self.keypoints else self.videos
+        words = ["lift", *given, "-o", result, "--json", "--quiet", *self._common()]
         if self.keypoints and self.video:
             words += ["--video", self.video]
         return [*words, *self.options]
@@ -203,8 +196,8 @@ def _require(fields: Fields, clip: Clip) -> None:
         raise fields.fail("video", "and keypoints are missing", "give one of them")
     if clip.lifted and {"track", "overlay", "report"} & set(clip.make):
         raise fields.fail("make", "has lift together with track, overlay or report", "make a clip of each")
-    if len(clip.videos) > 1 and clip.lifted:
-        raise fields.fail("videos", "cannot be combined with lift", "give video, or make track")
+    if len(clip.videos) > 1 and clip.keypoints:
+        raise fields.fail("videos", "cannot be combined with keypoints", "give video, or leave out keypoints")
     if clip.people and (clip.lifted or clip.keypoints):
         raise fields.fail(
             "people", "cannot be combined with lift or keypoints", "several people are tracked in a video"
