@@ -393,6 +393,18 @@ def test_the_command_reports_what_it_made(tmp_path: Path, capsys: pytest.Capture
 
 
 @pytest.mark.parametrize(
+    ("moving", "view"),
+    [("follow", "from a robot that follows behind"), ("pan", "side view from a camera that pans")],
+)
+def test_the_command_says_from_where_the_picture_is(
+    moving: str, view: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["simulate", "-o", str(tmp_path / "a"), "--frames", "4", "--size", "160x120", "--moving", moving]
+    assert main([*words, "--quiet"]) == 0
+    assert f": 4 frames, {view}, a person of" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
     ("options", "named"),
     [
         (["--frames", "1"], "--frames 1"),

@@ -88,8 +88,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--moving",
         choices=MOVING,
-        help="follow: a robot follows the person at 1 m; pan: the camera turns to them; shake: it is "
-        "hand-held",
+        help="follow: a robot follows the person, 1 m behind, whatever the --view; pan: the camera turns to "
+        "them; shake: it is hand-held",
     )
     add(
         "--people",
@@ -145,6 +145,7 @@ def run(args: argparse.Namespace) -> int:
     summary = {
         "frames": scenario.frames,
         "view": scenario.view,
+        "moving": scenario.moving,
         "seed": scenario.seed,
         "stature_m": meta["stature_m"],
         "speed_m_s": meta["mean_speed_m_s"],
@@ -166,8 +167,13 @@ def _given(args: argparse.Namespace) -> dict[str, Any]:
 
 def _text(summary: dict[str, Any], folder: str) -> str:
     low, middle, high = summary["person_px"]
+    view = {
+        "follow": "from a robot that follows behind",
+        "pan": f"{summary['view']} view from a camera that pans",
+        "shake": f"{summary['view']} view from a hand-held camera",
+    }.get(summary["moving"], f"{summary['view']} view")
     return (
-        f"{folder}: {summary['frames']} frames, {summary['view']} view, a person of "
+        f"{folder}: {summary['frames']} frames, {view}, a person of "
         f"{summary['stature_m']:.2f} m and {middle} ({low}-{high}) pixels at "
         f"{summary['speed_m_s']:.2f} m/s, {summary['stride_hz']:.2f} strides/s"
     )
