@@ -3,8 +3,8 @@
 
     lift_views.py [--record]
 
-The keypoints are the reference joints of the balancing man in the picture of each camera, with noise.  Two of
-the films are lifted too, with the detector; their rows have whatever ``gait lift`` warns of in the note.
+The keypoints are the reference joints of the balancing man in the picture of each camera, with noise.  The
+films are lifted too, with the detector; their rows have whatever ``gait lift`` warns of in the note.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import eval_clips
@@ -23,7 +24,9 @@ import table
 from facts import facts
 
 from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera, write_camera
 from gait.io.track_file import Joints, read_estimates
+from gait.io.video import Video
 from gait.lift.keypoints.joined import joined
 from gait.lift.segment.view import Perspective, Several
 from gait.lift.smooth import motion
@@ -32,8 +35,7 @@ from gait.reproducible import one_thread
 Floats = npt.NDArray[np.float64]
 
 VIEWS = (("cam_01",), ("cam_01", "cam_03"), ("cam_02", "cam_04"), ("cam_01", "cam_02", "cam_03", "cam_04"))
-FILMS = (3, 4)  # whose pictures match their calibration
-STOPS = (40, 100)  # frames of the films
+FILMS = (((3, 4), 40), ((3, 4), 100), ((1, 2, 3, 4), 100))  # numbers of films, and frames
 ANGLES = tuple(
     tuple(f"{side}_{part}" for part in parts)
     for side in "lr"
@@ -61,25 +63,30 @@ def measures(places: Floats, sd: Floats, truth: Floats, names: list[str]) -> lis
     return [*errors, float(off.mean()), float(np.median(off)), 1000 * float(np.median(sd))]
 
 
-def films(stop: int, joints: Joints, names: list[str]) -> tuple[list[object], str]:
-    """Row of ``gait lift`` of the films up to a frame, and the command's warnings."""
-    calibration = lift_tracks.BALANCING / "calibration" / "Calib_qualisys.toml"
-    words: list[object] = [sys.executable, "-m", "gait", "lift", "--offsets", 0, "--stop", stop]
-    words += [lift_tracks.BALANCING / "videos" / f"cam{k:02}.mp4" for k in FILMS]
-    for k in FILMS:
-        words += ["--camera", f"{calibration}:cam_{k:02}"]
-    head = f"films {' '.join(f'cam_{k:02}' for k in FILMS)}, {stop} frames"
+def films(
+    numbers: tuple[int, ...], stop: int, joints: Joints, cameras: dict[str, Camera], names: list[str]
+) -> tuple[list[object], str]:
+    """Row of ``gait lift`` of films up to a frame, and the command's warnings."""
+    offsets = ",".join(["0"] * (len(numbers) - 1))
+    words: list[object] = [sys.executable, "-m", "gait", "lift", "--offsets", offsets, "--stop", stop]
+    files = [lift_tracks.BALANCING / "videos" / f"cam{k:02}.mp4" for k in numbers]
+    head = f"films {' '.join(f'cam_{k:02}' for k in numbers)}, {stop} frames"
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "motion.csv"
+        words += files
+        for k, file in zip(numbers, files, strict=True):
+            camera = Path(folder) / f"{k}.json"
+            write_camera(camera, replace(cameras[f"cam_{k:02}"], width=Video(file).width))
+            words += ["--camera", camera]
         done = subprocess.run([*map(str, words), "-o", str(out)], capture_output=True, text=True, check=False)
         warnings = "; ".join(re.findall(r"the estimate(?:d stature)? is .*", done.stderr))
         if done.returncode:
-            return [head, *[None] * 8], f"{stop} frames are refused: {warnings or done.stderr}"
+            return [head, *[None] * 8], f"{head}: refused: {warnings or done.stderr}"
         found = read_estimates(out)
     places, sd = (np.stack([of[name] for name in names], axis=1) for of in (found.places, found.sd))
     truth = np.stack([joints.places[name][found.frame] for name in names], axis=1)
     inside = float((np.abs(places - truth) < lift_tracks.WITHIN * sd).mean())
-    return [head, *measures(places, sd, truth, names), inside, None, None], f"{stop} frames: {warnings}"
+    return [head, *measures(places, sd, truth, names), inside, None, None], f"{head}: {warnings or 'none'}"
 
 
 def main() -> int:
@@ -107,8 +114,8 @@ def main() -> int:
         cells = measures(found.places[:, order], found.sd[:, order], truth, names)
         rows.append([" ".join(views), *cells, *lift_tracks.coverage(found, truth, order), found.wider])
     warnings = []
-    for stop in STOPS:
-        row, words = films(stop, joints, names)
+    for numbers, stop in FILMS:
+        row, words = films(numbers, stop, joints, cameras, names)
         rows.append(row)
         warnings.append(words)
     head = [
@@ -130,9 +137,10 @@ def main() -> int:
         "and in the world; errors of the angles at elbows, hips and knees are in degrees, over frames "
         "and joints. Coverage is that of 90 % intervals. Pose2Sim's published errors of joint angles are "
         "2 to 6 degrees; they are for other motions and relative to markers, so only the order of "
-        "magnitude can be compared. films: gait lift of two films themselves, with the "
+        "magnitude can be compared. films: gait lift of the films themselves, with the "
         f"detector, and its warnings. {'. '.join(warnings)}. The films of cam_01 and cam_02 are cut to 1080 "
-        "columns while their calibration is for 1088."
+        "columns while their calibration is for 1088: the last ones are taken to be missing, as the rays of "
+        "all four cameras then miss each other least."
     )
     title = "A real motion by one camera and by several"
     table.publish("lift_views", title, head, rows, note) if record else table.show(title, head, rows)

@@ -1,23 +1,30 @@
 """gait lift with keypoints of several cameras: they determine the distance, not the person's size."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import walking_keypoints as walking
 
+from gait.bindings.segment_prior import SegmentPrior
 from gait.camera.camera import Camera, write_camera
 from gait.cli import main
-from gait.io.keypoints_file import write
+from gait.io.keypoints_file import read, write
 from gait.io.track_file import read_estimates
+from gait.lift.keypoints.observations import Grid
+from gait.lift.segment.view import Perspective, Several
+from gait.lift.smooth import motion
+from gait.lift.smooth.options import Options
 
 SIDE = Camera.looking((6.0, 5.0, 1.6), (0.3, 5.5, 0.9), walking.SIZE, 1000.0)
+LEGS, ARMS = ("hip", "knee", "ankle", "heel", "toe"), ("shoulder", "elbow", "wrist")
 LATE = 0.4  # seconds by which the second film began later
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """Keypoints of a tall person who walks towards a camera, as seen by it and by another from the side."""
+    """Keypoints of a tall person who walks towards a camera, in its view and in another from the side."""
     folder = tmp_path_factory.mktemp("views")
     for name, camera, seed in (("a", walking.view(), 1), ("b", SIDE, 2)):
         write_camera(folder / f"{name}.json", camera)
@@ -63,6 +70,36 @@ def test_two_views_are_nearer_than_one(place, capsys):
     assert began == pytest.approx(LATE, abs=0.04)
     late, _, _ = lift(place, "a", "b_late", options=["--offsets", f"{LATE}"])
     assert late < 1.3 * both
+
+
+@pytest.mark.long
+def test_limbs_that_a_view_swaps_in_half_of_the_frames_are_put_back(place, capsys):
+    """Also if so many are wrong that the motion of both views follows them: one view then shows the sides."""
+    right, _, _ = lift(place, "a", "b")
+    found = read(str(place / "b.csv"), walking.NAMES)[0]
+    uv = found.uv.copy()
+    for part, rows in ((LEGS, slice(4, 24)), (ARMS, slice(20, 38))):
+        left, other = ([found.names.index(f"{side}_{joint}") for joint in part] for side in "lr")
+        uv[rows, left], uv[rows, other] = found.uv[rows, other], found.uv[rows, left]
+    write(place / "b_swapped.csv", replace(found, uv=uv))
+    swapped, _, _ = lift(place, "a", "b_swapped")
+    kept, _, _ = lift(place, "a", "b_swapped", options=["--keep-sides"])
+    assert swapped < 1.1 * right and kept > 1.5 * right
+
+
+def test_enlarged_errors_do_not_hide_a_motion_unlike_the_priors():
+    """Chi2 is compared with that of a motion that fits, which is smaller the more the errors are enlarged."""
+    prior, observed = SegmentPrior.load(), walking.keypoints(SIDE)
+    shape = observed.uv.shape[:2]
+    errors = {"sd": np.full(shape, 9.0), "lasting_sd": np.full(shape, 4.0), "frame_sd": np.full(shape, 5.0)}
+    observed = replace(observed, **errors, confidence=np.ones(shape))
+    options = Options(pixel_sd=1e-3)
+    for view, usual in ((Several((SIDE, SIDE), np.zeros(shape[1], int)), 1 / 9), (Perspective(SIDE), 1.0)):
+        of = motion._Sequence(prior, observed, view, options, Grid.over(observed.time, prior))
+        assert motion._usual_chi2(of) == pytest.approx(usual, rel=1e-3)
+    plain = replace(observed, sd=None, lasting_sd=None, frame_sd=None)
+    several = Several((SIDE, SIDE), np.zeros(shape[1], int))
+    assert motion._usual_chi2(motion._Sequence(prior, plain, several, options, of.grid)) == 1.0
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from gait.lift.segment.view import AnyView, Parallel, Perspective, Several, View
 from gait.lift.smooth import motion, size
 from gait.lift.smooth.motion import Motion
 from gait.lift.smooth.options import Options
+from gait.lift.view_sides import best_sides
 from gait.progress import progress
 from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
@@ -214,7 +215,8 @@ def lift_views(
 
         if keypoints is None:
             keypoints, _ = keypoints_file.read(path, prior.names, request.ignore_unknown, request.clip)
-        one = prepare(path, keypoints, prior, replace(request, camera=camera), named, quiet)
+        own = replace(request, camera=camera, keep_sides=True)  # the views together show the sides
+        one = prepare(path, keypoints, prior, own, named, quiet)
         assert isinstance(one.view, Perspective)
         if number:
             given = None if offsets is None else offsets[number - 1]
@@ -230,14 +232,21 @@ def lift_views(
         prepared.append(one)
         cameras.append(one.view.camera)
     together, camera_of = joined([one.keypoints for one in prepared], began)
-    repairs = {
-        "swapped": sum(one.repairs["swapped"] for one in prepared),
-        "spikes": sum(one.repairs["spikes"] for one in prepared),
-        "offsets_s": began,
-    }
+    repairs = {"swapped": 0, "spikes": sum(one.repairs["spikes"] for one in prepared), "offsets_s": began}
     options = replace(request.options, pixel_sd=max(one.options.pixel_sd for one in prepared))
-    whole = Prepared(together, Several(tuple(cameras), camera_of), options, repairs)
-    return lift_prepared(views[0][0], whole, Edits(), prior, request, quiet)
+    several = Several(tuple(cameras), camera_of)
+    whole = Prepared(together, several, options, repairs)
+
+    def lift(keypoints: Keypoints) -> Lifted:
+        return lift_prepared(views[0][0], replace(whole, keypoints=keypoints), Edits(), prior, request, quiet)
+
+    lifted = lift(together) if request.keep_sides else best_sides(prior, together, several, options, lift)
+    for number, (path, _, _) in enumerate(views):
+        before, after = (each.among(camera_of == number) for each in (together, lifted.keypoints))
+        if swapped := swaps.swapped_between(before, after):
+            warn(f"{path}: {_named_swaps(swapped)}{' (--keep-sides)' * request.hints}")
+            repairs["swapped"] += int((after.visible & (after.uv != before.uv).any(axis=2)).sum())
+    return replace(lifted, repairs=repairs)
 
 
 def prepare(

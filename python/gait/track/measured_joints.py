@@ -107,7 +107,9 @@ class MeasuredJoints:
             now = view.camera(camera)
             expected = now.project(joints)
             uv, sd = _columns(points, names)
-            views.append((now, on_nearer_sides(uv, expected, names, np.ptp(expected[:, 1])), sd))
+            if mistaken_sides(uv, expected, names, np.ptp(expected[:, 1])):
+                uv, sd = uv[other_sides(names)], sd[other_sides(names)]
+            views.append((now, uv, sd))
         if len(views) < _LEAST_VIEWS:
             return unmoved
         places, joint_sd = posterior(joints, estimate.joint_sd, views)
@@ -161,8 +163,15 @@ def slopes(camera: Camera, points: Array) -> Array:
     return np.stack([(camera.project(points + _STEP * way) - at) / _STEP for way in np.eye(3)], axis=-1)
 
 
-def on_nearer_sides(uv: Array, expected: Array, names: Sequence[str], tall: Array | float) -> Array:
-    """Swap left and right keypoints of frames in which they then fit the expected ones better.
+def other_sides(names: Sequence[str]) -> list[int]:
+    """Columns of the joints on the other side of the body; a joint without sides is its own."""
+    return [names.index(_OTHER.get(name[:2], name[:2]) + name[2:]) for name in names]
+
+
+def mistaken_sides(
+    uv: Array, expected: Array, names: Sequence[str], tall: Array | float
+) -> NDArray[np.bool_]:
+    """Whether (...) keypoints of a frame fit the expected ones better with left and right swapped.
 
     Parameters
     ----------
@@ -173,10 +182,9 @@ def on_nearer_sides(uv: Array, expected: Array, names: Sequence[str], tall: Arra
     tall : (...)
         The person's height in the picture, pixels.
     """
-    swapped = uv[..., [names.index(_OTHER.get(name[:2], name[:2]) + name[2:]) for name in names], :]
     usual = _USUAL * np.asarray(tall)[..., None]
     kept, other = (
         np.nansum(np.log1p(np.sum((points - expected) ** 2, axis=-1) / usual**2), axis=-1)
-        for points in (uv, swapped)
+        for points in (uv, uv[..., other_sides(names), :])
     )
-    return np.where((other < kept)[..., None, None], swapped, uv)
+    return np.asarray(other < kept)

@@ -30,7 +30,7 @@ from gait.errors import UserError
 from gait.io import blob
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame
-from gait.track.measured_joints import STUDENT_DEGREES, on_nearer_sides, slopes
+from gait.track.measured_joints import STUDENT_DEGREES, mistaken_sides, other_sides, slopes
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene
 
@@ -154,7 +154,8 @@ def _view(camera: Camera, found: Keypoints, names: list[str], numbers: Array, jo
     columns = [found.names.index(name) for name in names]
     tall = np.maximum(picture_height(found)[at], 1.0)
     uv = np.where(visible[:, None, None], found.uv[at][:, columns], np.nan)
-    uv = on_nearer_sides(uv, camera.project(joints), names, tall)
+    mistaken = mistaken_sides(uv, camera.project(joints), names, tall)
+    uv = np.where(mistaken[:, None, None], uv[:, other_sides(names)], uv)
     lasting = np.nanmean(found.lasting_sd[at][:, columns] / tall[:, None], axis=0)
     return _View(camera, uv, found.sd[at][:, columns], _OWN * lasting, tall)
 

@@ -263,12 +263,21 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
         own = slice(first - part.start, end - part.start)
         shown = steady.part(part), pairs, observed[part]
         wrong[first:end] = _judged(*shown, wrong[part], own, sd, evidence)[own]
-    found = [
-        Swapped(joint, _spans(keypoints.frame[observed[:, k]], wrong[observed[:, k], k]))
+    after = _swapped(keypoints, pairs, wrong)
+    return after, swapped_between(keypoints, after)
+
+
+def swapped_between(before: Keypoints, after: Keypoints) -> list[Swapped]:
+    """List what was swapped between two states of the same keypoints."""
+    joints, pairs = _paired(before)
+    observed = np.asarray(before.visible[:, pairs].any(axis=2))
+    same = np.isclose(before.uv[:, pairs], after.uv[:, pairs], rtol=0, atol=0, equal_nan=True)
+    wrong = ~same.all(axis=(2, 3)) & observed
+    return [
+        Swapped(joint, _spans(before.frame[observed[:, k]], wrong[observed[:, k], k]))
         for k, joint in enumerate(joints)
         if wrong[:, k].any()
     ]
-    return _swapped(keypoints, pairs, wrong), found
 
 
 def share_suspected(keypoints: Keypoints, sd: float) -> float:

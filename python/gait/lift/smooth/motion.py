@@ -462,7 +462,8 @@ def _lift(of: _Sequence) -> Motion:
         balance=of.options.balance,
         covariance=of.options.covariance,
     )
-    sized = _sized(of, found, found.chi2_per_observation)
+    chi2 = found.chi2_per_observation / _usual_chi2(of)
+    sized = _sized(of, found, chi2)
     require_size(sized.places, of.prior, task.stature)
     return Motion(
         of.prior.names,
@@ -476,13 +477,28 @@ def _lift(of: _Sequence) -> Motion:
         found.log_volume_ratio,
         explain.summarise(task.fits, of.alone()[1]),
         found.evidence,
-        found.chi2_per_observation,
+        chi2,
         resized=sized.factor,
         outliers=found.outliers,
         uv=of.view.alone().project(sized.places, found.lengths),
         state=found.state,
         covariance=sized.covariance,
     )
+
+
+def _usual_chi2(of: _Sequence) -> float:
+    """Chi2 per observation of a motion that fits.
+
+    A detector's standard deviations are enlarged so that frames count as independent; the chi2 of a motion
+    that fits is then as much smaller, and compared with 1 no motion would look unlike the prior.  With one
+    camera, where a wider prior leaves the depth open, it is taken as 1.
+    """
+    keypoints = of.keypoints
+    if not isinstance(of.view, Several) or keypoints.frame_sd is None or keypoints.lasting_sd is None:
+        return 1.0
+    changing = keypoints.frame_sd**2 - keypoints.lasting_sd**2
+    shares = changing / keypoints.changing(of.options.pixel_sd, whole=True) ** 2
+    return float(np.where(np.isfinite(shares), shares, 1.0)[keypoints.visible].mean())
 
 
 def believed_stature(options: Options, usual: float) -> tuple[float, float]:

@@ -1,0 +1,129 @@
+"""Left and right in the keypoints of several views, which the motion that is lifted from all of them shows.
+
+A detector swaps the limbs of a person it sees from the side or from behind, in up to half of a film's frames.
+A swapped limb of one view does not fit the motion that the other frames and views show.  So the views are
+lifted together, limbs are swapped where that fits the motion better, and all is lifted again, until nothing
+changes.  If swaps are suspected in a view alone, or the motion fits poorly, too many may have been wrong to
+begin with: the view with the fewest suspects is lifted alone and shows the sides in the others, and the
+motion with the larger evidence is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.bindings.segment_prior import SegmentPrior
+from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints
+from gait.lift.keypoints import swaps
+from gait.lift.segment.view import Perspective, Several
+from gait.lift.smooth import motion
+from gait.lift.smooth.motion import Motion
+from gait.lift.smooth.options import Options
+from gait.reproducible import one_thread
+from gait.track.measured_joints import mistaken_sides, other_sides
+
+Floats = npt.NDArray[np.float64]
+
+_ROUNDS = 5  # in each of which limbs are swapped and the views lifted again
+
+
+class _Result(Protocol):
+    @property
+    def motion(self) -> Motion:
+        """The motion lifted."""
+
+
+LiftedAs = TypeVar("LiftedAs", bound=_Result)
+
+
+def best_sides(
+    prior: SegmentPrior,
+    keypoints: Keypoints,
+    several: Several,
+    options: Options,
+    lift: Callable[[Keypoints], LiftedAs],
+) -> LiftedAs:
+    """Lift the joined keypoints of several views by `lift`, with left and right as the motion shows them."""
+    lifted = _with_sides(keypoints, several, lift)
+    views = range(len(several.cameras))
+    suspected = [
+        swaps.share_suspected(keypoints.among(several.of_point == view), options.pixel_sd) for view in views
+    ]
+    if lifted.motion.chi2_per_observation <= motion.POOR_FIT and not any(suspected):
+        return lifted
+    begun = _sides_of(prior, keypoints, several, int(np.argmin(suspected)), options)
+    if begun is None:
+        return lifted
+    other = _with_sides(begun, several, lift)
+    return other if other.motion.evidence > lifted.motion.evidence else lifted
+
+
+def _with_sides(keypoints: Keypoints, several: Several, lift: Callable[[Keypoints], LiftedAs]) -> LiftedAs:
+    """Lift, swap left and right where that fits the motion better, and lift again until nothing changes."""
+    lifted = lift(keypoints)
+    for _ in range(_ROUNDS):
+        expected = [camera.project(lifted.motion.places) for camera in several.cameras]
+        swapped = _on_nearer_sides(keypoints, several, expected, lifted.motion.names)
+        if swapped is None:
+            break
+        keypoints = swapped
+        lifted = lift(keypoints)
+    return lifted
+
+
+def _sides_of(
+    prior: SegmentPrior, keypoints: Keypoints, several: Several, view: int, options: Options
+) -> Keypoints | None:
+    """Swap left and right in other views where they then fit the motion that one view shows; None if nowhere.
+
+    Its place is wrong in depth, so only differences from the middle of a frame's points are compared.
+    """
+    own = keypoints.among(several.of_point == view)
+    try:
+        with one_thread():
+            alone = motion.lift(
+                prior, own, Perspective(several.cameras[view]), options, motion.output_names(prior, own)
+            )
+    except UserError:
+        return None
+    expected = []
+    for number, camera in enumerate(several.cameras):
+        points = keypoints.among(several.of_point == number)
+        there = camera.project(alone.places)
+        off = points.uv - there[:, [alone.names.index(name) for name in points.names]]
+        expected.append(there + np.nanmedian(off, axis=1, keepdims=True))
+    return _on_nearer_sides(keypoints, several, expected, alone.names)
+
+
+def _on_nearer_sides(
+    keypoints: Keypoints, several: Several, expected: Sequence[Floats], known: Sequence[str]
+) -> Keypoints | None:
+    """Swap left and right of each limb in each frame of a view where that is nearer; None if nowhere.
+
+    Parameters
+    ----------
+    expected : sequence of (T, J, 2)
+        Points expected in each view, with the names `known`, pixels.
+    """
+    uv, confidence = keypoints.uv.copy(), keypoints.confidence.copy()
+    for number, points in enumerate(expected):
+        own = np.flatnonzero(several.of_point == number)
+        tall = float(np.nanmedian(np.ptp(points[..., 1], axis=1)))
+        for limb in swaps.LIMB_JOINTS:
+            columns = [k for k in own.tolist() if keypoints.names[k][2:] in limb]
+            names = [keypoints.names[k] for k in columns]
+            if len(names) != 2 * len({name[2:] for name in names}):
+                continue  # some joints have one side only
+            there = points[:, [known.index(name) for name in names]]
+            wrong = mistaken_sides(keypoints.uv[:, columns], there, names, tall)
+            other = [columns[k] for k in other_sides(names)]
+            for values, before in ((uv, keypoints.uv), (confidence, keypoints.confidence)):
+                values[np.ix_(wrong, columns)] = before[np.ix_(wrong, other)]
+    changed = not np.array_equal(uv, keypoints.uv, equal_nan=True)
+    return replace(keypoints, uv=uv, confidence=confidence) if changed else None
