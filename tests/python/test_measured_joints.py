@@ -18,7 +18,7 @@ from gait.track.person_keypoints import PersonKeypoints
 FRAMES, FPS, NOISE = 30, 30, 2.0
 MODEL = gait.Model()
 NAMES = MODEL.joint_names
-SEEN = [k for k, name in enumerate(NAMES) if name not in ("pelvis", "neck", "head_top")]
+SHOWN = [k for k, name in enumerate(NAMES) if name not in ("pelvis", "neck", "head_top")]
 CAMERAS = [
     gait.Camera.looking(place, (0.5, 0.0, 0.9), (640, 480), 700.0)
     for place in ((0.5, -5.0, 1.2), (5.5, -2.0, 1.2))
@@ -74,14 +74,14 @@ def keypoints(true: np.ndarray, cameras: int, swapped: range = range(0)) -> Pers
     """What the cameras see, with noise; in the `swapped` frames the last has left and right swapped."""
     rng, views = np.random.default_rng(5), []
     other = [
-        NAMES.index({"l_": "r_", "r_": "l_"}[name[:2]] + name[2:]) for name in map(NAMES.__getitem__, SEEN)
+        NAMES.index({"l_": "r_", "r_": "l_"}[name[:2]] + name[2:]) for name in map(NAMES.__getitem__, SHOWN)
     ]
     for c, camera in enumerate(CAMERAS[:cameras]):
         found = {}
         for k, joints in enumerate(true):
-            observed = joints[other if c and k in swapped else SEEN]
-            uv = camera.project(observed) + NOISE * rng.standard_normal((len(SEEN), 2))
-            found[k] = FrameKeypoints([NAMES[j] for j in SEEN], uv, NOISE)
+            observed = joints[other if c and k in swapped else SHOWN]
+            uv = camera.project(observed) + NOISE * rng.standard_normal((len(SHOWN), 2))
+            found[k] = FrameKeypoints([NAMES[j] for j in SHOWN], uv, NOISE)
         views.append(PersonKeypoints(camera, {0: found}, 0))
     return PersonKeypoints(CAMERAS[0], views[0]._keypoints, 0, further=views[1:])
 
@@ -99,13 +99,13 @@ def test_two_cameras_move_joints_to_the_persons(swapped: range) -> None:
     after = moved(track, keypoints(true, 2, swapped), 2)
     before = np.array([one.joints for one in track]) - true
     errors = np.array([one.joints for one in after]) - true
-    with_pelvis = [*SEEN, NAMES.index("pelvis")]
+    with_pelvis = [*SHOWN, NAMES.index("pelvis")]
     assert np.sqrt((errors[:, with_pelvis] ** 2).mean()) < 0.4 * np.sqrt((before[:, with_pelvis] ** 2).mean())
     rest = [k for k in range(len(NAMES)) if k not in with_pelvis]
     np.testing.assert_array_equal(errors[:, rest], before[:, rest])
-    sd = np.array([one.joint_sd for one in after])[:, SEEN]
+    sd = np.array([one.joint_sd for one in after])[:, SHOWN]
     assert (sd < 0.8 * SD).all()
-    assert (np.abs(errors[:, SEEN]) < 1.645 * sd).mean() > 0.85
+    assert (np.abs(errors[:, SHOWN]) < 1.645 * sd).mean() > 0.85
     assert after[9].mean == track[9].mean  # the state is the tracker's
 
 

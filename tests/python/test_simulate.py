@@ -396,7 +396,7 @@ def test_the_command_reports_what_it_made(tmp_path: Path, capsys: pytest.Capture
     ("moving", "view"),
     [("follow", "from a robot that follows behind"), ("pan", "side view from a camera that pans")],
 )
-def test_the_command_says_from_where_the_picture_is(
+def test_the_command_states_from_where_the_picture_is(
     moving: str, view: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["simulate", "-o", str(tmp_path / "a"), "--frames", "4", "--size", "160x120", "--moving", moving]

@@ -97,7 +97,9 @@ def _sides_of(
         points = keypoints.among(several.of_point == number)
         there = camera.project(alone.places)
         off = points.uv - there[:, [alone.names.index(name) for name in points.names]]
-        expected.append(there + np.nanmedian(off, axis=1, keepdims=True))
+        rows = np.isfinite(off).any(axis=(1, 2))
+        there[rows] += np.nanmedian(off[rows], axis=1, keepdims=True)
+        expected.append(there)
     return _on_nearer_sides(keypoints, several, expected, alone.names)
 
 
