@@ -69,8 +69,8 @@ def keypoint_array(keypoints: FrameKeypoints, names: Sequence[str]) -> Any:
     uv, known = np.asarray(keypoints.uv, float), keypoints.names
     if uv.shape != (len(known), 2):
         raise ValueError(f"keypoints: uv has shape {uv.shape} instead of {(len(known), 2)}")
-    sd = np.broadcast_to(keypoints.sd, len(uv))
-    found = dict(zip(known, zip(uv, sd, strict=True), strict=True))
+    sd = np.broadcast_to(keypoints.sd, len(uv)).tolist()
+    found = dict(zip(known, zip(uv.tolist(), sd, strict=True), strict=True))
     array = (abi.KeypointC * len(names))()
     for point, name in zip(array, names, strict=True):
         (point.u, point.v), point.sd = found.get(name, ((0.0, 0.0), -1.0))

@@ -7,6 +7,7 @@ other people's keypoints, and the detector's jumps.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,8 @@ class PersonKeypoints:
         self._asked: tuple[Frame, NDArray[np.float64]] | None = None
         self._expected = np.empty((0, 2))  # that estimate's joints in the picture
         self._known: dict[int, tuple[FrameKeypoints, float]] = {}  # distances from that estimate
+        self._behind = False  # whether one of its joints is behind the camera
+        self._listed: tuple[int, list[FrameKeypoints]] = -1, []  # a frame, and everyone's keypoints in it
 
     def add(self, id: int) -> None:
         """Add an id of this person."""
@@ -141,22 +144,26 @@ class PersonKeypoints:
 
     def _found(self, frame: int) -> list[FrameKeypoints]:
         """List the keypoints of everyone in a frame."""
-        people = (keypoints[frame] for keypoints in self._keypoints.values() if frame in keypoints)
-        return [keypoints for keypoints in people if np.isfinite(keypoints.uv).any()]
+        if self._listed[0] != frame:
+            people = (keypoints[frame] for keypoints in self._keypoints.values() if frame in keypoints)
+            self._listed = frame, [keypoints for keypoints in people if np.isfinite(keypoints.uv).any()]
+        return self._listed[1]
 
     def _distance(self, frame: Frame, estimate: Estimate, keypoints: FrameKeypoints) -> float:
         """Median distance from the estimated joints, person's heights; infinite if no joint was found."""
         self.joints_in(frame, estimate)
         if id(keypoints) not in self._known:
             apart = self._distances(frame, estimate, keypoints, tuple(keypoints.names))
-            self._known[id(keypoints)] = keypoints, float(np.median(apart)) if len(apart) else np.inf
+            self._known[id(keypoints)] = keypoints, _median(apart) if len(apart) else np.inf
         return self._known[id(keypoints)][1]
 
     def joints_in(self, frame: Frame, estimate: Estimate) -> NDArray[np.float64]:
         """Project the estimated joints into a frame of the first camera, (J, 2) pixels; the last is kept."""
-        if self._asked is None or self._asked[0] is not frame or self._asked[1] is not estimate.joints:
+        asked = self._asked
+        if asked is None or asked[1] is not estimate.joints or not _same_camera(asked[0], frame):
             self._asked, self._known = (frame, estimate.joints), {}
             self._expected = frame.camera(self._camera).project(estimate.joints)
+            self._behind = bool(np.isnan(self._expected).any())
         return self._expected
 
     def _distances(
@@ -164,19 +171,43 @@ class PersonKeypoints:
     ) -> NDArray[np.float64]:
         """Distances (K,) of the named keypoints, where found, from the estimated joints, person's heights."""
         expected = self.joints_in(frame, estimate)
-        if np.isnan(expected).any():  # behind the camera
+        if self._behind:
             return np.full(len(names), np.inf)
-        common = [name for name in names if name in keypoints.names and name in estimate.joint_names]
-        ours = expected[[estimate.joint_names.index(name) for name in common]]
-        theirs = np.asarray(keypoints.uv, float)[[list(keypoints.names).index(name) for name in common]]
+        of_ours, of_theirs = _in_common(names, estimate.joint_names, tuple(keypoints.names))
+        ours, theirs = expected[of_ours], np.asarray(keypoints.uv, float)[of_theirs]
         found = np.isfinite(theirs).all(axis=1)
-        if not found.any():
+        if not found.all():
+            ours, theirs = ours[found], theirs[found]
+        if not len(ours):
             return np.empty(0)
-        ours, theirs = ours[found], theirs[found]
-        extent = [np.hypot(*np.ptp(joints, axis=0)) for joints in (ours, theirs)]
+        extent = [np.hypot(*(joints.max(axis=0) - joints.min(axis=0))) for joints in (ours, theirs)]
         # scaled, so that an estimate that is too large is not nearer than one of the right size
-        height = np.ptp(expected[:, 1]) * min(extent[1] / max(extent[0], 1e-9), 1.0)
+        tall = expected[:, 1].max() - expected[:, 1].min()
+        height = tall * min(extent[1] / max(extent[0], 1e-9), 1.0)
         return np.asarray(np.hypot(*(ours - theirs).T) / max(height, 1.0))
+
+
+@lru_cache
+def _in_common(
+    names: tuple[str, ...], ours: tuple[str, ...], theirs: tuple[str, ...]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return where those of `names` that both have are in `ours` and in `theirs`."""
+    common = [name for name in names if name in theirs and name in ours]
+    places = ([all_names.index(name) for name in common] for all_names in (ours, theirs))
+    first, second = (np.array(place, np.intp) for place in places)
+    return first, second
+
+
+def _same_camera(one: Frame, other: Frame) -> bool:
+    """Whether two frames certainly show the scene from the same place."""
+    return one is other or (one.pose is None and other.pose is None)
+
+
+def _median(values: NDArray[np.float64]) -> float:
+    """Median of at least one number, as `numpy.median`, which takes longer for few."""
+    ordered = sorted(values.tolist())
+    middle = len(ordered) // 2
+    return ordered[middle] if len(ordered) % 2 else (ordered[middle - 1] + ordered[middle]) / 2
 
 
 def _most(answers: Sequence[bool | None]) -> bool | None:

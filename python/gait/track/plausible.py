@@ -6,7 +6,6 @@ from collections import deque
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
@@ -40,7 +39,7 @@ class Plausibility:
         self._keypoints = keypoints
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
         self._travel = 1.0 - belt
-        self._path: deque[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = deque()
+        self._path: deque[tuple[float, ...]] = deque()  # times, places, velocities
 
     def restart(self) -> None:
         """Forget the path, since the track starts again elsewhere."""
@@ -63,12 +62,12 @@ class Plausibility:
         `time`: seconds; it may decrease.
         """
         heading, speed = estimate.mean.heading, estimate.speed * self._travel
-        velocity = speed * np.array([np.cos(heading), np.sin(heading)])
-        self._path.append((time, estimate.mean.pelvis[:2], velocity))
+        self._path.append((time, *estimate.mean.pelvis[:2], speed * np.cos(heading), speed * np.sin(heading)))
         while abs(time - self._path[0][0]) > 1.0:
             self._path.popleft()
-        times, places, velocities = map(np.array, zip(*self._path, strict=True))
-        walked = (velocities[1:] * np.diff(times)[:, None]).sum(axis=0)
+        path = np.array(self._path)
+        times, places, velocities = path[:, 0], path[:, 1:3], path[:, 3:]
+        walked = (velocities[1:] * (times[1:] - times[:-1])[:, None]).sum(axis=0)
         departure = float(np.hypot(*(places[-1] - places[0] - walked)))
         usual = abs(estimate.mean.stature - self._stature) < _BEYOND * self._stature_sd
         return usual and departure < _DEPARTURE
