@@ -116,12 +116,12 @@ def test_the_persons_events_are_uncertain_in_every_stride_alike():
     track = walking_track()
     parameters = measure(track, drawn(track, late=0.0))
     stride = 1 / 0.9
-    for kind, sd in (("strike", 0.008), ("off", 0.022)):
+    for kind, sd in (("strike", 0.007), ("off", 0.019)):
         for times in getattr(parameters.event_sd, kind).values():
             np.testing.assert_allclose(times[1:-1] / stride, sd, rtol=0.3)
             assert np.ptp(times[1:-1]) < 1e-3
     assert parameters.strides["right"].sd["stride_time_s"][1:-1].max() < 0.002
-    expected = 100 * np.hypot(0.008, 0.022) / np.sqrt(2)  # the feet are independent
+    expected = 100 * np.hypot(0.007, 0.019) / np.sqrt(2)  # the feet are independent
     assert parameters.summary()["stance_percent"]["both"]["sd"] == pytest.approx(expected, rel=0.3)
     late = measure(
         walking_track(phase_sd=0.04), drawn(track, late=0.0)

@@ -54,7 +54,7 @@ _LASTING_PHASE_SHARE = 0.6  # share of the variance of the phase that lasts
 #: simulate` who are in no reported result (decisions.md).
 _FOOT = np.array([[1.0, 0.95, 0.65], [0.5, 0.45, 0.35], [0.25, 0.25, 0.25]])
 _BY_WAVE = np.repeat(_FOOT, (1, 2, 2), axis=0)
-_STRIKE_SD, _OFF_SD = 0.008, 0.022
+_STRIKE_SD, _OFF_SD = 0.007, 0.019
 _SMOOTH_S = 0.12  # duration over which errors within a stride are smooth
 _SIZE_SHARE = 0.7  # error of the size over the person's part of a joint: many joints determine the size
 
