@@ -427,8 +427,8 @@ typedef struct gait_camera_pose { GAIT_CAMERA_POSE_FIELDS(GAIT_DECLARE) } gait_c
 
 typedef struct gait_frame { GAIT_FRAME_FIELDS(GAIT_DECLARE) } gait_frame;
 
-/* INIT: the track is settling.  AMBIGUOUS: left and right are unknown, two hypotheses fit about equally, or the person
- * may face the other way.  LOST: the images no longer support the estimate. */
+/* INIT: the track is settling.  AMBIGUOUS: left and right are unknown, two hypotheses fit about equally, or another body
+ * fits as well (GAIT_EST_OTHERS_FIT).  LOST: the images no longer support the estimate. */
 typedef GAIT_ENUM(gait_track_status) {
     GAIT_TRACK_INIT = 0, GAIT_TRACK_TRACKING = 1, GAIT_TRACK_AMBIGUOUS = 2, GAIT_TRACK_LOST = 3
 } gait_track_status;
@@ -437,6 +437,7 @@ typedef GAIT_ENUM(gait_track_status) {
 #define GAIT_EST_NO_IMAGE   0x2u /* prediction only */
 #define GAIT_EST_DEGENERATE 0x4u /* effective sample size below 2 */
 #define GAIT_EST_UNSUPPORTED 0x8u /* the images do not show a person at the estimate */
+#define GAIT_EST_OTHERS_FIT  0x10u /* another body does so as well: turned, or in another phase */
 
 /* Estimate after a frame. */
 #define GAIT_ESTIMATE_FIELDS(FIELD)                                                                                   \

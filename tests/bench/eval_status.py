@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Status of the track of people who walk in unusual ways, with all defaults, as a newcomer runs it.
 
-    eval_status.py [--seeds 0,100] [--only NAME...] [--model classes] [--record]
+    eval_status.py [--seeds 0,100] [--only NAME...] [--model classes] [--smooth] [--record]
 
 `gait track VIDEO --camera CAMERA -o OUT`, with the detector on, of clips that `gait simulate` makes and of
 the development clip of a person who comes towards a long lens.  Each preset is made with its own seed plus
-each of --seeds.  A model other than the default has a page of its own.  Clips are kept in build/eval-status.
+each of --seeds.  A model other than the default has a page of its own, and --smooth too.  Clips are kept in
+build/eval-status.
 """
 
 from __future__ import annotations
@@ -33,9 +34,9 @@ NAMES = ("toward", "backwards", "limping", "stick", "crutches", "stopping", "sta
 FAR = "toward300_08"
 STATUSES = ("tracking", "ambiguous", "init", "lost")
 _READING = """\
-`gait track` with the camera, the detector on and other options at their defaults except the model where
-the command names one, on clips of `gait simulate --preset` and on a development clip. Shares are of the
-frames in which all joints are in the picture. good: knees and ankles within 9 % of the person's height
+`gait track` with the camera, the detector on and other options at their defaults except the model and
+--smooth where the command names them, on clips of `gait simulate --preset` and on a development clip.
+Shares are of the frames in which all joints are in the picture. good: knees and ankles within 9 % of the person's height
 on average in the picture, hips in place; swap: left and right swapped; off: hips or legs elsewhere.
 wrong: share of the frames with status `tracking` that are not good. Root-aligned and absolute error of
 15 joints in space, and error of the heading: medians over the frames with status `tracking`."""
@@ -51,6 +52,7 @@ def main() -> int:
     )
     parser.add_argument("--only", nargs="+", metavar="NAME", help="presets, or the development clip (all)")
     parser.add_argument("--model", default="walk", help="model to track with (walk)")
+    parser.add_argument("--smooth", action="store_true", help="also smooth the whole clip")
     parser.add_argument("--record", action="store_true")
     args = parser.parse_args()
     folders = [made(name, int(more)) for name in args.only or NAMES if name != FAR
@@ -58,10 +60,10 @@ def main() -> int:
     far = eval_clips.DATA / "eval" / "dev" / FAR
     if far.is_dir() and FAR in (args.only or (FAR,)):
         folders.append(far)
-    rows = []
+    rows, options = [], ["--model", args.model, *(["--smooth"] if args.smooth else [])]
     with progress("eval-status", len(folders)) as update:
         for done, folder in enumerate(folders, 1):
-            rows.append(_row(from_truth(folder), args.model))
+            rows.append(_row(from_truth(folder), options))
             update(done)
     head = ["clip", *(f"{status} %" for status in STATUSES), "good %", "swap %", "off %", "wrong %",
             "root mm", "abs mm", "heading deg", "stride rate %", "failed"]  # fmt: skip
@@ -69,6 +71,8 @@ def main() -> int:
     page, title = "eval_status", "Status of unusual walks"
     if args.model != "walk":
         page, title = f"{page}_{Path(args.model).stem}", f"{title}, tracked with -m {args.model}"
+    if args.smooth:
+        page, title = f"{page}_smooth", f"{title}, smoothed"
     if args.record:
         table.publish(page, title, head, rows, note)
     else:
@@ -85,9 +89,9 @@ def made(name: str, more: int) -> Path:
     return folder
 
 
-def _row(clip: Clip, model: str) -> list[object]:
-    """Track a clip with a model and return its row."""
-    name, found = clip.folder.name, run(clip, "auto", ["--model", model])
+def _row(clip: Clip, options: list[str]) -> list[object]:
+    """Track a clip with options and return its row."""
+    name, found = clip.folder.name, run(clip, "auto", options)
     if found.failed:
         return [name, *[None] * (len(STATUSES) + 8), found.failed]
     track = read_estimates(OUT / f"{name}_auto.csv")

@@ -1,6 +1,7 @@
 """Smoothing: the dynamics in numpy, the exact linear case, two modes, new starts, the command."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -9,7 +10,7 @@ from drawn_person import camera, clip, state_at, wall, write
 from transitions import Step, Transitions
 
 from gait import GaitError, Model, State, Tracker, TrackerConfig, UserError
-from gait.bindings.abi import Mode
+from gait.bindings.abi import Flag, Mode, TrackStatus
 from gait.bindings.library import struct_fields
 from gait.bindings.model import read_blob
 from gait.body.model_curves import ModelCurves
@@ -19,7 +20,7 @@ from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.motion.footfalls import Draws
 from gait.track.class_changes import ClassChanges
-from gait.track.smooth import Smoother, Spool, draw_motions, smoothed
+from gait.track.smooth import Smoother, Spool, draw_motions, smoothed, with_later_checks
 
 SECTIONS = blob.decode(read_blob(None))
 if "PROP" not in SECTIONS:  # two ways in which limbs differ in length
@@ -244,6 +245,37 @@ def test_an_estimate_is_that_of_the_most_frequent_class():
     assert now.mean.stride_hz == pytest.approx(0.5) and now.mean.coef[0] == pytest.approx(1.0)
     np.testing.assert_allclose(FOUR.pose(now.mean)[0], joints[0], atol=1e-4)
     np.testing.assert_allclose(now.angles, angles[0], atol=1e-5)
+
+
+def test_a_frame_that_others_fit_stays_ambiguous():
+    states = of_classes(np.repeat(WALK, 100))
+    joints, angles = FOUR.poses(states)
+    tracker = Tracker(FOUR, camera(), TrackerConfig.default(particles=64))
+    tracker.start(FOUR.prior()[0], State(phase=0.05), 0)
+    then = replace(tracker.step(None, 0), status=TrackStatus.AMBIGUOUS)
+    halves = states.copy()
+    halves["phase"][50:] += 0.5
+    for flags, drawn, status in (
+        (0, states, TrackStatus.TRACKING),
+        (0, halves, TrackStatus.AMBIGUOUS),
+        (Flag.OTHERS_FIT, states, TrackStatus.AMBIGUOUS),
+    ):
+        assert smoothed(replace(then, flags=flags), FOUR, drawn, joints, angles).status == status
+
+
+def test_the_frames_that_a_check_averages_over_are_flagged_up_to_a_start():
+    tracker = Tracker(FOUR, camera(), TrackerConfig.default(particles=64))
+    tracker.start(FOUR.prior()[0], State(phase=0.05), 0)
+    estimate = tracker.step(None, 0)
+    filtered = [
+        (
+            Frame(i, 0.125 * i, wall()),
+            replace(estimate, frame=i % 20, flags=Flag.OTHERS_FIT * (i in (15, 22))),
+        )
+        for i in range(30)
+    ]
+    flagged = [bool(found.flags & Flag.OTHERS_FIT) for _, found in with_later_checks(filtered)]
+    assert [i for i, one in enumerate(flagged) if one] == [*range(10, 16), 20, 21, 22]
 
 
 def test_a_clip_of_a_model_with_classes_is_smoothed():

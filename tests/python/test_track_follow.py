@@ -24,6 +24,7 @@ from gait.track.plausible import Plausibility
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
 FRAMES, TRUE = clip(MODEL, SECTIONS, 30)
+FORWARDS = {"walk": 1}
 JOINTS = np.array([MODEL.pose(state)[0] for state in TRUE])
 START = 15
 GAP = 45
@@ -306,7 +307,11 @@ def astray(estimate):
             return Start(again, estimate.mean, estimate.sd) if first <= again < stop else None
 
         follower = Follower(
-            Script(estimate, ghosts[0], starts), Film(), people, Plausibility(people, 1.75, 0.05, 0.0), find
+            Script(estimate, ghosts[0], starts),
+            Film(),
+            people,
+            Plausibility(people, 1.75, 0.05, 0.0, FORWARDS),
+            find,
         )
         rows = list(follower.follow(Start(start, estimate.mean, estimate.sd), range(100)))
         assert [frame.number for frame, _ in rows] == list(range(100))
@@ -341,12 +346,20 @@ def test_legs_that_keypoints_show_elsewhere_are_no_agreement(estimate):
 
 
 @pytest.mark.parametrize(
-    "spike, grown, status", [(0.0, 0.0, "TRACKING"), (1.0, 0.0, "AMBIGUOUS"), (0.0, 0.5, "AMBIGUOUS")]
+    "spike, grown, heading, motion_class, status",
+    [
+        (0.0, 0.0, 0.0, "walk", "TRACKING"),
+        (1.0, 0.0, 0.0, "walk", "AMBIGUOUS"),
+        (0.0, 0.5, 0.0, "walk", "AMBIGUOUS"),
+        (0.0, 0.0, np.pi, "walk", "AMBIGUOUS"),
+        (0.0, 0.0, np.pi, "back", "TRACKING"),
+    ],
 )
-def test_without_keypoints_a_walk_must_be_plausible(estimate, spike, grown, status):
-    plausible = Plausibility(PersonKeypoints(camera(), {}, -1), 1.75, 0.05, 0.0)
+def test_without_keypoints_a_walk_must_be_plausible(estimate, spike, grown, heading, motion_class, status):
+    plausible = Plausibility(PersonKeypoints(camera(), {}, -1), 1.75, 0.05, 0.0, FORWARDS | {"back": -1})
     for i in range(40):
-        mean = replace(TRUE[-1], stature=1.75 + grown, heading=0.0)
+        mean = replace(TRUE[-1], stature=1.75 + grown, heading=heading)
         mean.pelvis = np.array([1.2 * i / 30 + spike * (i > 20), 0.0, 0.95])
-        now = plausible.judged(Frame(i, i / 30, FRAMES[0]), replace(estimate, mean=mean, speed=1.2))
+        walking = replace(estimate, mean=mean, speed=1.2, motion_class=motion_class)
+        now = plausible.judged(Frame(i, i / 30, FRAMES[0]), walking)
     assert now.status == TrackStatus[status]

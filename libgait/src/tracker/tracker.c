@@ -302,6 +302,15 @@ static void check_estimate(gait_tracker *t, float dt, bool lost, const state_lay
     core->found = proven;
 }
 
+/* Whether the checks find that a different body fits as well.  A standing person has no left and right step. */
+static bool others_fit(const gait_tracker *t, const gait_estimate *e)
+{
+    const tracker_core *const core = t->core;
+    bool const still = t->layouts[e->motion_class].model->direction == 0;
+    return core->fit_margin < 0.0f || core->front_back_margin < 0.0f ||
+           (!still && core->left_right_margin < 0.0f);
+}
+
 static gait_track_status status_of(const gait_tracker *t, float dt, const gait_estimate *e)
 {
     const tracker_core *const core = t->core;
@@ -316,8 +325,7 @@ static gait_track_status status_of(const gait_tracker *t, float dt, const gait_e
         return GAIT_TRACK_INIT;
     if (e->hypothesis_weight < DOMINANT_WEIGHT)
         return seconds_since(t, core->start_utime) < SETTLE_TIME ? GAIT_TRACK_INIT : GAIT_TRACK_AMBIGUOUS;
-    bool const sides_open = !still && (hypotheses_open(t) || core->left_right_margin < 0.0f);
-    bool const open = sides_open || core->front_back_margin < 0.0f || core->fit_margin < 0.0f || departs;
+    bool const open = (!still && hypotheses_open(t)) || others_fit(t, e) || departs;
     return open ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;
 }
 
@@ -388,7 +396,8 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     e.status = s.degenerate ? GAIT_TRACK_LOST : status_of(t, dt, &e);
     e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (has_image ? 0 : GAIT_EST_NO_IMAGE) |
               (has_image && few ? GAIT_EST_DEGENERATE : 0) |
-              (has_image && core->support_utime != core->utime ? GAIT_EST_UNSUPPORTED : 0);
+              (has_image && core->support_utime != core->utime ? GAIT_EST_UNSUPPORTED : 0) |
+              (others_fit(t, &e) ? GAIT_EST_OTHERS_FIT : 0);
     e.ess = (float)s.ess;
     e.log_evidence = s.log_evidence;
     if (e.status == GAIT_TRACK_TRACKING && h->stage == HYPOTHESES_ONE && !core->partly_hidden)

@@ -97,6 +97,7 @@ class Flag(IntFlag):
     NO_IMAGE = 2
     DEGENERATE = 4
     UNSUPPORTED = 8
+    OTHERS_FIT = 16
 
 
 class Projection(IntEnum):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ _LEAST_SD = 0.05  # metres; least standard deviation of a stature
 _ELSEWHERE = "the person detected in the image does not match"
 _NO_WALK = "the path does not match the strides, or the stature is unusual"
 _UNSEEN = "the images hardly show the person"
+_OTHERS_FIT = "another direction, side or phase fits the image as well"
 
 
 class Plausibility:
@@ -31,14 +33,21 @@ class Plausibility:
         Expected stature of the person, and its standard deviation, metres.
     belt : float
         Share of each stride that a treadmill's belt moves the person back.
+    directions : mapping of str to int
+        For each class of motion: 1 forwards, -1 backwards, 0 standing.
     """
 
     def __init__(
-        self, keypoints: PersonKeypoints | PersonShapes, stature: float, stature_sd: float, belt: float
+        self,
+        keypoints: PersonKeypoints | PersonShapes,
+        stature: float,
+        stature_sd: float,
+        belt: float,
+        directions: Mapping[str, int],
     ) -> None:
         self._keypoints = keypoints
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
-        self._travel = 1.0 - belt
+        self._travel, self._directions = 1.0 - belt, directions
         self._path: deque[tuple[float, ...]] = deque()  # times, places, velocities
 
     def restart(self) -> None:
@@ -47,10 +56,15 @@ class Plausibility:
         self._keypoints.restart()
 
     def judged(self, frame: Frame, estimate: Estimate) -> Estimate:
-        """Change `tracking` to `ambiguous` unless keypoints or, without any, images and walk support it."""
+        """Change `tracking` to `ambiguous` unless keypoints or, without any, images and walk support it.
+
+        The reason of an estimate that is `ambiguous` already is added, unless only left and right are open.
+        """
         walks = self._walks(frame.time, estimate)
         agree = self._keypoints.agree(frame, estimate)
         supported = not estimate.flags & Flag.UNSUPPORTED
+        if estimate.status == TrackStatus.AMBIGUOUS and estimate.flags & Flag.OTHERS_FIT:
+            return replace(estimate, reason=_OTHERS_FIT)
         if estimate.status != TrackStatus.TRACKING or agree or (agree is None and walks and supported):
             return estimate
         reason = _ELSEWHERE if agree is not None else _NO_WALK if supported else _UNSEEN
@@ -61,7 +75,8 @@ class Plausibility:
 
         `time`: seconds; it may decrease.
         """
-        heading, speed = estimate.mean.heading, estimate.speed * self._travel
+        heading = estimate.mean.heading
+        speed = self._directions[estimate.motion_class] * estimate.speed * self._travel
         self._path.append((time, *estimate.mean.pelvis[:2], speed * np.cos(heading), speed * np.sin(heading)))
         while abs(time - self._path[0][0]) > 1.0:
             self._path.popleft()

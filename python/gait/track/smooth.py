@@ -13,7 +13,7 @@ of Rauch, Tung and Striebel (1965).  The class of motion is drawn first (`gait.t
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.bindings import abi
-from gait.bindings.abi import TrackStatus
+from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
 from gait.bindings.state import State
@@ -47,6 +47,7 @@ _SIZE_SD = 0.01  # relative sd of the size that pictures determine at best, as i
 _LASTING_PHASE, _ONE_PHASE = 0.3, 0.05
 #: Least weight of the dominant hypothesis with status `tracking`: DOMINANT_WEIGHT of estimate.h.
 _DOMINANT_WEIGHT = 0.7
+_CHECKED_S = 0.7  # seconds before a frame that its checks average over at least: AVERAGE_TIME of fit_check.c
 
 
 class Spool:
@@ -314,7 +315,7 @@ class Smoother:
         frames = [frame for frame, _ in self._filtered]
         rows = [
             (frame, self._widened(i, smoothed(estimate, model, states[:, i], joints[:, i], angles[:, i])))
-            for i, (frame, estimate) in enumerate(self._filtered)
+            for i, (frame, estimate) in enumerate(with_later_checks(self._filtered))
         ]
         return rows, Draws(
             np.array([frame.number for frame in frames], np.int64),
@@ -350,6 +351,28 @@ class Smoother:
         phase = float(np.hypot(now.sd.phase, lasting))
         sd = replace(now.sd, phase=phase, stature=stature, pelvis=joint_sd[0])
         return replace(now, joint_sd=joint_sd, sd=sd)
+
+
+def with_later_checks(filtered: Sequence[tuple[Frame, Estimate]]) -> list[tuple[Frame, Estimate]]:
+    """Flag also the estimates before one that other bodies fit, as its checks are averages over these frames.
+
+    Parameters
+    ----------
+    filtered : sequence of (Frame, Estimate)
+        Frames in order; an estimate with `frame` 0 is a start.
+
+    Returns
+    -------
+    list of (Frame, Estimate)
+    """
+    out, flagged = [], np.inf  # time of the next frame that others fit
+    for frame, estimate in reversed(filtered):
+        flagged = frame.time if estimate.flags & Flag.OTHERS_FIT else flagged
+        within = flagged - frame.time <= _CHECKED_S
+        flags = estimate.flags | (Flag.OTHERS_FIT if within else 0)
+        out.append((frame, replace(estimate, flags=flags)))
+        flagged = np.inf if estimate.frame == 0 else flagged
+    return out[::-1]
 
 
 def smoothed(
@@ -395,7 +418,7 @@ def smoothed(
     phase_r = float(np.abs(np.exp(2j * np.pi * states["phase"]).mean()))
     return replace(
         then,
-        status=_status(then.status, weight),
+        status=_status(then, weight),
         ess=float(len(states)),
         phase_r=phase_r,
         hypothesis_weight=weight,
@@ -438,8 +461,13 @@ def _circular(values: Array, use: NDArray[np.bool_], turn: float) -> tuple[float
     return float(mean * turn), float(sd * turn)
 
 
-def _status(then: TrackStatus, weight: float) -> TrackStatus:
-    """Decide the status of a smoothed frame: lost frames stay lost; the motions decide about ambiguity."""
-    if then == TrackStatus.LOST or (weight < _DOMINANT_WEIGHT and then == TrackStatus.INIT):
-        return then
-    return TrackStatus.TRACKING if weight >= _DOMINANT_WEIGHT else TrackStatus.AMBIGUOUS
+def _status(then: Estimate, weight: float) -> TrackStatus:
+    """Decide the status of a smoothed frame from the filter's estimate and the dominant motions' weight.
+
+    Lost frames stay lost.  The motions decide whether left and right are known, but all are of the filter's
+    particles: if another body fitted the pictures as well, it still does.
+    """
+    sure = weight >= _DOMINANT_WEIGHT
+    if then.status == TrackStatus.LOST or (not sure and then.status == TrackStatus.INIT):
+        return then.status
+    return TrackStatus.TRACKING if sure and not then.flags & Flag.OTHERS_FIT else TrackStatus.AMBIGUOUS
