@@ -36,10 +36,10 @@ STATUSES = ("tracking", "ambiguous", "init", "lost")
 _READING = """\
 `gait track` with the camera, the detector on and other options at their defaults except the model and
 --smooth where the command names them, on clips of `gait simulate --preset` and on a development clip.
-Shares are of the frames in which all joints are in the picture. good: knees and ankles within 9 % of the person's height
-on average in the picture, hips in place; swap: left and right swapped; off: hips or legs elsewhere.
-wrong: share of the frames with status `tracking` that are not good. Root-aligned and absolute error of
-15 joints in space, and error of the heading: medians over the frames with status `tracking`."""
+Shares are of the frames in which all joints are in the picture. good: knees and ankles within 9 % of the
+person's height on average in the picture, hips in place; swap: left and right swapped; off: hips or legs
+elsewhere. wrong: share of the frames with status `tracking` that are not good. Root-aligned and absolute
+error of 15 joints in space, and error of the heading: medians over the frames with status `tracking`."""
 
 
 def main() -> int:
