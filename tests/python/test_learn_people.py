@@ -248,11 +248,14 @@ def test_the_slope_is_its_own_mirror_image():
     np.testing.assert_allclose(mirrored(found[None])[0], found, atol=1e-12)
 
 
-def test_the_forward_speed_is_left_to_the_components():
+def test_strides_are_longer_at_higher_rates_only_in_models_of_several_classes():
     rng, paces = np.random.default_rng(7), [np.array([-1.0, 1.0]), np.array([0.0, 1.0])]
-    rows, subject, at = persons(rng, wave(rng), paces)
-    rows[:, :, CHANNELS.index("root_forward")] += at[:, None]
-    assert not people.pace_slope(rows, subject, at)[:, CHANNELS.index("root_forward")].any()
+    rows, subject, at = persons(rng, 0.0 * wave(rng), paces)
+    forward = CHANNELS.index("root_forward")
+    rows[:, :, forward] += 0.1 * at[:, None]
+    assert not people.pace_slope(rows, subject, at)[:, forward].any()
+    longer = people.pace_slope(rows, subject, at, stride=True)[:, forward]
+    assert np.all((longer > 0.03) & (longer < 0.1))  # shrunk, as two people are few
 
 
 @pytest.mark.parametrize("paces", [[[-1.0, 1.0]], [[0.5, 0.5], [-1.0], [1.5, 1.5]]])

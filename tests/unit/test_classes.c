@@ -332,6 +332,17 @@ static void test_starts(void)
     toy_tracker_free(t);
 }
 
+/* With several classes the rate returns to the mean of people ten times more slowly. */
+static void test_pace_lasts(void)
+{
+    gait_tracker_config const cfg = settings();
+    dynamics const d = {.cfg = &cfg, .rule = state_layout_init(model(), &cfg, kernels_choose(~0u))};
+    dynamics const of_one = {.cfg = &cfg, .rule = state_layout_init(toy_model(), &cfg, kernels_choose(~0u))};
+    CHECK_NEAR(dynamics_step_init(&d, 0.1f, 2.0f, 0).rate.keep, exp(-0.1 / (10.0 * (double)cfg.rate_time)),
+               1e-6);
+    CHECK_NEAR(dynamics_step_init(&of_one, 0.1f, 2.0f, 0).rate.keep, exp(-0.1 / (double)cfg.rate_time), 1e-6);
+}
+
 /* Of people who seemed to stand for a moment nine in ten walk on as if they had not stood, at their own rate. */
 static void test_resumes(void)
 {
@@ -367,6 +378,7 @@ static void all(void)
     test_refused();
     test_another_order();
     test_rates();
+    test_pace_lasts();
     test_resumes();
     test_starts();
     test_one_class();

@@ -2,6 +2,9 @@
 #include "base/fmath.h"
 #include "base/rng.h"
 
+/* People whose class of motion changes also change their pace, for longer and further than people who only walk. */
+static const float SEVERAL_RATE_TIME = 10.0f; /* times the time in which the rate relaxes */
+
 enum { NORMALS = 4 * ((F_MAX + 3) / 4) };
 
 static void normals(const dynamics *d, uint32_t stream, uint32_t frame, int32_t i, int32_t count, float *out)
@@ -102,7 +105,7 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
     const gait_tracker_config *const c = d->cfg;
     float const root_dt = __builtin_sqrtf(dt), mean_rate = d->rule.model->stride_hz;
     float const direction = (float)d->rule.model->direction;
-    bool const settling = age < c->settle_time;
+    bool const settling = age < c->settle_time, several = d->rule.model->classes > 1;
     dynamics_step s = {
         .model = d->rule.model,
         .seed = d->seed,
@@ -123,7 +126,8 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .heading_noise = c->heading_noise * root_dt,
         .stature_noise =
             (settling ? c->stature_noise_start : c->stature_noise) * d->stature_sd_ratio * root_dt,
-        .rate = relax(dt, c->rate_time, c->rate_noise * mean_rate),
+        .rate =
+            relax(dt, several ? SEVERAL_RATE_TIME * c->rate_time : c->rate_time, c->rate_noise * mean_rate),
         .level = relax(dt, c->tilt_time, c->vertical_noise),
         .turn_beyond = age > 0.0f ? turns_beyond(relax(dt, c->turn_time, 0.0f).keep) : INFINITY,
         .turn_sd = c->turn_sd,

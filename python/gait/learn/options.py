@@ -76,6 +76,7 @@ class LearnOptions:
     dask: str | None = None  #: scheduler of a Dask cluster that reads them instead
     reverse: bool = False  #: learn recordings in reversed time
     classes: tuple[str, ...] = ()  #: further classes of motion, NAME or NAME=SOURCE
+    several: bool = False  #: the model is one class of several, so its strides are longer at higher rates
     changes: tuple[str, ...] = ()  #: recordings of changes between classes, and folders of them
 
 

@@ -67,7 +67,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     """
     own = read_cyclic(options.sources[0]) if adds_to_a_model(options) else None
     first = options.activity if own is None else first_class(own)
-    wanted, alone = _parsed(options, first), replace(options, classes=())
+    wanted, alone = _parsed(options, first), replace(options, classes=(), several=True)
     if options.changes and not wanted:
         return _only_changes(own, options, note)
     if own is None:
@@ -232,6 +232,7 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> tuple[
             report=None,
             segments=SegmentOptions(source="none"),
             classes=(),
+            several=True,
         )
         try:
             figures = run(own, lambda line: note(f"class {name}: {line}"), elsewhere=of_the_first)

@@ -165,7 +165,9 @@ def fit(
     paces = people.paces(sequences, index)
     slope, even = np.zeros(model.mean.shape), model.filled
     if not paper:
-        slope, even = _paces_removed(model.filled, rows.mask, row_subject, paces[rows.sequence])
+        slope, even = _paces_removed(
+            model.filled, rows.mask, row_subject, paces[rows.sequence], options.several
+        )
         model = people.refine(model, even, row_subject, wanted, metric)
     lasting = people.lasting_offsets(even, row_subject, wanted, metric)
     model = grounded(model, rows.visible, proportions)
@@ -220,10 +222,12 @@ def _analysed(values: Floats, mask: Mask, count: int, paper: bool) -> Components
     )
 
 
-def _paces_removed(filled: Floats, mask: Mask, subject: Indices, paces: Floats) -> tuple[Floats, Floats]:
+def _paces_removed(
+    filled: Floats, mask: Mask, subject: Indices, paces: Floats, stride: bool
+) -> tuple[Floats, Floats]:
     """Return the change of curves with the pace (T, M), and the cycles (R, T, M) at the mean pace."""
     whole = people.bounded(filled, mask, subject)
-    slope = people.pace_slope(whole, subject, paces)
+    slope = people.pace_slope(whole, subject, paces, stride=stride)
     return slope, people.at_mean_pace(whole, paces, slope)
 
 

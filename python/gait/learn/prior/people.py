@@ -40,10 +40,9 @@ LEAST_RELATIVE_SD = 0.01  # least relative sd, even if all recordings are alike
 #: Variance of the pace of one imaginary person whose gait does not change with the rate.  It shrinks the
 #: slopes towards 0 if only a few people were recorded, or all at similar rates.
 CONSTANT_GAIT_VARIANCE = 1.0
-#: This channel does not depend on the rate: at the same rate step lengths differ widely between people, and a
-#: tracker that can hardly see the distance, as from the front, would accumulate the error in speed.  The
-#: components still contain it.
-WITHOUT_RATE = CHANNELS.index("root_forward")
+#: The length of the stride depends on the rate only in models of several classes, for people who change their
+#: pace.  The default model leaves it to the components.
+STRIDE = CHANNELS.index("root_forward")
 #: Coefficients of a channel's Fourier series: a constant and ten harmonics, which keeps models small.  In a
 #: person whose rate is one standard deviation off, higher harmonics would move joints by only 0.12 mm (rms,
 #: `make eval-learn`).
@@ -178,13 +177,15 @@ def paces(sequences: list[Sequence], subject: Indices) -> Floats:
     return pace(by_subject(rates, subject, RELATIVE_RATE_SD), rates)
 
 
-def pace_slope(filled: Floats, subject: Indices, paces: Floats, terms: int = TERMS) -> Floats:
+def pace_slope(
+    filled: Floats, subject: Indices, paces: Floats, terms: int = TERMS, *, stride: bool = False
+) -> Floats:
     """Return the change (T, M) of the cycle per unit of pace, common to all people, who have equal weights.
 
     It is the least-squares slope of the differences between a person's completed cycles (R, T, M), own units,
     and their mean, with their mirror images, as a Fourier series.  It is 0 with one person or one pace, and
-    for `WITHOUT_RATE`.  UserError if an angle changes more than any walk's, as with jumps of 360 degrees
-    between recordings.
+    for `STRIDE` unless `stride` is true.  UserError if an angle changes more than any walk's, as with jumps
+    of 360 degrees between recordings.
     """
     together, variance = np.zeros(filled.shape[1:]), CONSTANT_GAIT_VARIANCE
     people = np.unique(subject)
@@ -197,7 +198,7 @@ def pace_slope(filled: Floats, subject: Indices, paces: Floats, terms: int = TER
             together += np.tensordot(away[part], filled[rows[part]], 1)
             release(filled)
     found = together[None] / variance
-    found[..., WITHOUT_RATE] = 0.0
+    found[..., STRIDE] *= stride
     slope = series(0.5 * (found + mirrored(found))[0], terms)
     channel = int(np.abs(slope).sum(axis=0).argmax())
     if np.abs(slope[:, channel]).sum() > STEEPEST_SLOPE:
