@@ -458,6 +458,8 @@ double start_describe(const gait_start *s, const start_candidate *c, double at, 
     h->speed = (float)c->theta[START_SPEED];
     h->speed_sd = sd_of(row[START_SPEED]);
     h->in_place = c->in_place;
+    if (c->in_place)
+        h->sd.turn_rate = 0.0f;
     h->observations = w->problem.observations;
     h->chi2_per_observation = (float)(c->chi2 / (double)w->problem.observations);
     return -cholesky_log_det(w->U, N, LD);
