@@ -22,7 +22,7 @@ import numpy as np
 import table
 from eval_real import OUT, run
 from facts import facts
-from real_clip import Clip, errors_in_space, from_truth
+from real_clip import Clip, errors_in_space, errors_of_rows, from_truth
 
 from gait.io.track_file import Track, read_estimates, read_truth
 from gait.progress import progress
@@ -33,13 +33,15 @@ FOLDER = Path(__file__).resolve().parents[2] / "build" / "eval-status"
 NAMES = ("toward", "backwards", "limping", "stick", "crutches", "stopping", "standing")
 FAR = "toward300_08"
 STATUSES = ("tracking", "ambiguous", "init", "lost")
+FAR_MM = 150.0  # root-aligned error of a wrong frame
 _READING = """\
 `gait track` with the camera, the detector on and other options at their defaults except the model and
 --smooth where the command names them, on clips of `gait simulate --preset` and on a development clip.
 Shares are of the frames in which all joints are in the picture. good: knees and ankles within 9 % of the
 person's height on average in the picture, hips in place; swap: left and right swapped; off: hips or legs
-elsewhere. wrong: share of the frames with status `tracking` that are not good. Root-aligned and absolute
-error of 15 joints in space, and error of the heading: medians over the frames with status `tracking`."""
+elsewhere. wrong: share of the frames with status `tracking` that are not good; far: that are more than
+150 mm off in space, root-aligned. Root-aligned and absolute error of 15 joints in space, and error of
+the heading: medians over the frames with status `tracking`."""
 
 
 def main() -> int:
@@ -66,7 +68,7 @@ def main() -> int:
             rows.append(_row(from_truth(folder), options))
             update(done)
     head = ["clip", *(f"{status} %" for status in STATUSES), "good %", "swap %", "off %", "wrong %",
-            "root mm", "abs mm", "heading deg", "stride rate %", "failed"]  # fmt: skip
+            "far %", "root mm", "abs mm", "heading deg", "stride rate %", "failed"]  # fmt: skip
     note = f"{facts()}\n\n{_READING}"
     page, title = "eval_status", "Status of unusual walks"
     if args.model != "walk":
@@ -93,7 +95,7 @@ def _row(clip: Clip, options: list[str]) -> list[object]:
     """Track a clip with options and return its row."""
     name, found = clip.folder.name, run(clip, "auto", options)
     if found.failed:
-        return [name, *[None] * (len(STATUSES) + 8), found.failed]
+        return [name, *[None] * (len(STATUSES) + 9), found.failed]
     track = read_estimates(OUT / f"{name}_auto.csv")
     status = Counter(one for one, frame in zip(track.status, track.frame, strict=True)
                      if int(frame) in clip.reference)  # fmt: skip
@@ -104,6 +106,7 @@ def _row(clip: Clip, options: list[str]) -> list[object]:
         *(round(100 * status[one] / len(clip.reference)) for one in STATUSES),
         *(round(100 * score.share[kind]) for kind in ("good", "swap", "off")),
         100 * score.wrong / score.tracking if score.tracking else None,
+        100 * np.mean(errors_of_rows(clip, track, rows)[0] > FAR_MM) if rows.any() else None,
         *errors_in_space(clip, track, rows),
         _heading(clip, track, rows),
         100 * score.stride_error,

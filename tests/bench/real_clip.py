@@ -240,15 +240,19 @@ def _timing(clip: Clip, track: Track) -> tuple[float, float]:
 
 def errors_in_space(clip: Clip, track: Track, rows: np.ndarray) -> list[float]:
     """Root-aligned and absolute error of 15 true joints, mm: medians over `rows` of the track."""
-    truth = read_truth(clip.folder / "truth.csv")
     if not rows.any():
         return [np.nan, np.nan]
+    return [float(np.median(values)) for values in errors_of_rows(clip, track, rows)]
+
+
+def errors_of_rows(clip: Clip, track: Track, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root-aligned and absolute error of 15 true joints, mm, of each of `rows` of the track."""
+    truth = read_truth(clip.folder / "truth.csv")
     found, true = (
         np.stack([joints.places[name][at] for name in EVAL15], axis=1)
         for joints, at in ((track, rows), (truth, np.searchsorted(truth.frame, track.frame[rows])))
     )
-    apart = 1000 * np.linalg.norm(found - true, axis=2).mean(axis=1)
-    return [float(np.median(values)) for values in (root_errors(found, true), apart)]
+    return root_errors(found, true), 1000 * np.linalg.norm(found - true, axis=2).mean(axis=1)
 
 
 def project(track: Track, row: int, camera: Camera) -> Points:
