@@ -359,7 +359,7 @@ static void test_out_of_range(double tiny, double threshold)
     CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && error_of(&out, &worst) < 0.1);
 }
 
-/* A person without size of whom one point is seen far more exactly than rounding: an estimate is finite, or there is none. */
+/* A person without size, one point of which is seen far more exactly than rounding: an estimate is finite, or there is none. */
 static void test_absurd(void)
 {
     gait_lift_config c = toy_lift_config(GAIT_LIFT_ORTHOGRAPHIC);
