@@ -52,8 +52,8 @@ static double relaxed(double x, double tau, double noise, double n)
     return keep * x + noise * sqrt(0.5 * tau * (1.0 - keep * keep)) * n;
 }
 
-/* Independent normals about the state of a pelvis; its height over the ground and the floor's own level (0
- * +- 0.03 m) are two measurements of one thing. */
+/* Independent normals about the state of a pelvis, but half of the people do not turn; the pelvis's height over the
+ * ground and the floor's own level (0 +- 0.03 m) are two measurements of one thing. */
 static void truth_start(const state_layout *rule, const gait_state *mean, const double n[NORMALS], double *x)
 {
     double const floor = 0.03, height_sd = start_sd[F_Z],
@@ -68,7 +68,7 @@ static void truth_start(const state_layout *rule, const gait_state *mean, const 
         .heading = mean->heading + (float)s[F_HEADING],
         .pitch = mean->pitch + (float)s[F_PITCH],
         .roll = mean->roll + (float)s[F_ROLL],
-        .turn_rate = (float)s[F_TURN],
+        .turn_rate = n[FIELDS] < 0.0 ? 0.0f : (float)(sqrt(2.0) * s[F_TURN]),
         .pelvis = {mean->pelvis[0] + (float)s[F_X], mean->pelvis[1] + (float)s[F_Y], mean->pelvis[2]},
         .coef = {(float)s[F_COEF], (float)s[F_COEF + 1]},
         .proportion = {(float)s[F_COEF + 2]},
