@@ -504,7 +504,8 @@ GAIT_API gait_result gait_tracker_start(gait_tracker *t, const gait_state *mean,
 GAIT_API gait_result gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out, gait_error *err);
 /* Estimate of the frame `back` steps ago, in [0, config lag], given every frame since: its particles have the present
  * weights of their descendants.  0: the present frame.  GAIT_ERR_STATE: fewer steps since the start.  ess counts the
- * remaining ancestors; a status of LOST stays, others depend on the present hypothesis weight. */
+ * remaining ancestors.  With `back` 0 the status is that of the step; a status of LOST stays, others depend on what is known
+ * now, and are AMBIGUOUS where a frame up to 0.7 s later has GAIT_EST_OTHERS_FIT. */
 GAIT_API gait_result gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *out, gait_error *err);
 
 /* ---- advanced: instruction sets ---------------------------------------------------------------------- */

@@ -81,6 +81,7 @@ static void test_ancestors(void)
         CHECK(gait_tracker_lagged(t, 0, &past, NULL) == GAIT_OK);
         CHECK(memcmp(&past.mean, &e.mean, sizeof e.mean) == 0 && memcmp(&past.sd, &e.sd, sizeof e.sd) == 0);
         CHECK(memcmp(&past.pose, &e.pose, sizeof e.pose) == 0 && past.ess == e.ess);
+        CHECK(past.status == e.status);
     }
     CHECK(fewer > SHOTS / 2); /* the number of ancestors does decrease */
     free(t);
@@ -156,6 +157,36 @@ static void test_surer(void)
     free(t);
 }
 
+/* A flag of other bodies, on a frame or soon after, makes it ambiguous; one before it, or much later, does not. */
+static void test_checks(void)
+{
+    gait_tracker_config const cfg = config(30);
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    gait_estimate e, past;
+    for (int n = 0; n < SHOTS; n++)
+        film_step(t, 1, n, 0, &e);
+    CHECK(e.status == GAIT_TRACK_TRACKING && !(e.flags & GAIT_EST_OTHERS_FIT));
+    int32_t const slot = history_slot(&t->history, t->core->generation, 5);
+    int64_t const age = t->history.record[slot].age;
+    int ambiguous = 0, tracked = 0;
+    t->history.record[slot].flags |= GAIT_EST_OTHERS_FIT;
+    for (int back = 1; back <= 30; back++) {
+        CHECK(gait_tracker_lagged(t, back, &past, NULL) == GAIT_OK);
+        int64_t const before = age - (past.utime - t->core->start_utime);
+        bool const doubtful = before >= 0 && before <= 700000;
+        CHECK(past.status == (doubtful ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING));
+        ambiguous += doubtful;
+        tracked += !doubtful;
+    }
+    CHECK(ambiguous > 5 && tracked > 5);
+    t->history.record[slot].flags &= ~GAIT_EST_OTHERS_FIT;
+    CHECK(gait_tracker_lagged(t, 5, &past, NULL) == GAIT_OK && past.status == GAIT_TRACK_TRACKING);
+    t->core->found = 0; /* no image has proven a person */
+    t->history.record[slot].status = GAIT_TRACK_INIT;
+    CHECK(gait_tracker_lagged(t, 5, &past, NULL) == GAIT_OK && past.status == GAIT_TRACK_INIT);
+    free(t);
+}
+
 int main(void)
 {
     film_make(1, SHOTS);
@@ -163,5 +194,6 @@ int main(void)
     test_kept();
     test_limits();
     test_surer();
+    test_checks();
     return CHECK_DONE();
 }

@@ -4,6 +4,8 @@
 #include "tracker/hypotheses.h"
 #include <string.h>
 
+static const int64_t CHECKED_TIME = 700000; /* microseconds that a check averages over at least */
+
 void fixed_lag_record(gait_tracker *t, const gait_estimate *e)
 {
     int32_t const slot = t->core->generation;
@@ -60,14 +62,30 @@ static strata gathered_strata(const strata *all, const int32_t *ancestor, int32_
     return s;
 }
 
-/* A track that was lost stays lost; otherwise the status depends on what is known now of left and right. */
-static gait_track_status lagged_status(const gait_tracker *t, gait_track_status then, float hypothesis_weight)
+/* Whether another body fitted as well, or did so soon after: the checks are averages over the frames before. */
+static bool others_fitted(const gait_tracker *t, int32_t back, int64_t age)
 {
-    if (then == GAIT_TRACK_LOST)
-        return then;
-    if (hypothesis_weight >= DOMINANT_WEIGHT && !hypotheses_open(t))
+    for (int32_t k = back; k >= 0; k--) {
+        const generation_record *const r =
+            &t->history.record[history_slot(&t->history, t->core->generation, k)];
+        if (r->age - age <= CHECKED_TIME && (r->flags & GAIT_EST_OTHERS_FIT))
+            return true;
+    }
+    return false;
+}
+
+/* The present status is the frame's own, and a track that was lost stays lost; otherwise the status depends on what is
+ * known now of the person and of left and right, and on the checks. */
+static gait_track_status lagged_status(const gait_tracker *t, int32_t back, const generation_record *then,
+                                       float hypothesis_weight)
+{
+    gait_track_status const status = (gait_track_status)then->status;
+    if (back == 0 || status == GAIT_TRACK_LOST)
+        return status;
+    if (t->core->found && hypothesis_weight >= DOMINANT_WEIGHT && !hypotheses_open(t) &&
+        !others_fitted(t, back, then->age))
         return GAIT_TRACK_TRACKING;
-    return then == GAIT_TRACK_INIT ? then : GAIT_TRACK_AMBIGUOUS;
+    return status == GAIT_TRACK_INIT ? status : GAIT_TRACK_AMBIGUOUS;
 }
 
 void fixed_lag_estimate(gait_tracker *t, int32_t back, gait_estimate *out)
@@ -93,6 +111,6 @@ void fixed_lag_estimate(gait_tracker *t, int32_t back, gait_estimate *out)
     estimate_weighted(t, &p, best, &e);
     e.ess = (float)pf_ess(&weights);
     e.flags = record.flags;
-    e.status = lagged_status(t, (gait_track_status)record.status, e.hypothesis_weight);
+    e.status = lagged_status(t, back, &record, e.hypothesis_weight);
     *out = e;
 }
