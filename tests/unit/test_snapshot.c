@@ -141,6 +141,9 @@ static void test_damage(void)
     kept[0] ^= 1;
     refuse(kept, bytes, GAIT_ERR_MAGIC);
     kept[0] ^= 1;
+    kept[7]--; /* an older format of the same length, from a build with the same version */
+    refuse(kept, bytes, GAIT_ERR_VERSION);
+    kept[7]++;
     CHECK(gait_tracker_restore(target, kept, bytes, NULL) == GAIT_OK); /* undamaged it is taken */
     CHECK(gait_tracker_digest(target) == gait_tracker_digest(t));
     toy_tracker_free(target);

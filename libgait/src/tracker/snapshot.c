@@ -4,14 +4,17 @@
 #include <string.h>
 
 typedef struct snapshot_header {
-    char magic[8];
+    char magic[7];
+    uint8_t format;
     uint32_t abi, version;
     uint64_t bytes;         /* of the whole snapshot */
     uint64_t model, config; /* digests: a snapshot fits only a tracker of the same model and configuration */
     uint64_t body;          /* hash of the state that follows */
 } snapshot_header;
 
-static const char MAGIC[8] = {'G', 'A', 'I', 'T', 'S', 'N', 'P', '\n'};
+static const char MAGIC[7] = {'G', 'A', 'I', 'T', 'S', 'N', 'P'};
+/* Raised by every change of the state that is saved.  10 (then the magic's last character) may lack fit_margin. */
+enum { FORMAT = 11 };
 
 static size_t state_bytes(const gait_tracker *t)
 {
@@ -39,7 +42,8 @@ size_t snapshot_bytes(const gait_tracker *t)
 
 void snapshot_save(const gait_tracker *t, void *mem)
 {
-    snapshot_header h = {.abi = GAIT_ABI,
+    snapshot_header h = {.format = FORMAT,
+                         .abi = GAIT_ABI,
                          .version = GAIT_VERSION,
                          .bytes = snapshot_bytes(t),
                          .model = t->model->digest,
@@ -226,9 +230,10 @@ gait_result snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
     memcpy(&h, mem, sizeof h);
     if (memcmp(h.magic, MAGIC, sizeof MAGIC) != 0)
         return base_fail(err, GAIT_ERR_MAGIC, -1, "these bytes are not a tracker snapshot");
-    if (h.abi != GAIT_ABI || h.version != GAIT_VERSION)
-        return base_fail(err, GAIT_ERR_VERSION, -1, "snapshot made by library version %u, this is version %u",
-                         h.version, (unsigned)GAIT_VERSION);
+    if (h.format != FORMAT || h.abi != GAIT_ABI || h.version != GAIT_VERSION)
+        return base_fail(err, GAIT_ERR_VERSION, -1,
+                         "snapshot of format %u by library version %u, this is format %u, version %u",
+                         h.format, h.version, (unsigned)FORMAT, (unsigned)GAIT_VERSION);
     if (h.model != t->model->digest || h.config != config_digest(t))
         return base_fail(err, GAIT_ERR_VERSION, -1,
                          "snapshot of a tracker with another model or configuration");

@@ -22,7 +22,8 @@ typedef struct hypotheses_state {
     double recent_log_ratio; /* the second over the first, all terms, over the last few frames, nats */
 } hypotheses_state;
 
-/* Saved and hashed in this order, followed by the arrays of gait_tracker up to state_end. */
+/* Saved and hashed in this order, followed by the arrays of gait_tracker up to state_end; a change of either raises FORMAT
+ * of snapshot.c. */
 typedef struct tracker_core {
     int64_t utime, start_utime;
     int64_t support_utime; /* when an image last supported the estimate */
