@@ -1,6 +1,7 @@
 """Several cameras that film one walk: the films are synchronised, and the place becomes certain."""
 
 import json
+import threading
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -234,3 +235,20 @@ def test_only_the_first_film_has_to_show_the_start(tmp_path, monkeypatch, capsys
     alone = ["track", "video_2.mp4", "--camera", "away.json", *words[words.index("--init") :], "-o", "u.csv"]
     assert main(alone) == 1
     assert "the start is outside the picture" in capsys.readouterr().err
+
+
+def test_one_thread_chooses_keypoints(tmp_path, monkeypatch):
+    """Choices are remembered, so the results of two threads would depend on their order."""
+    monkeypatch.chdir(tmp_path)
+    simulate(replace(SCENARIO, frames=6), ".")
+    choose, threads = PersonKeypoints.choose, []
+
+    def noted(self, frame, last):
+        threads.append(threading.get_ident())
+        return choose(self, frame, last)
+
+    monkeypatch.setattr(PersonKeypoints, "choose", noted)
+    words = ["track", "video.mp4", "video_2.mp4", "--camera", "camera.json", "--camera", "camera_2.json"]
+    words += ["--offsets", "0", "--init", "init.json", "--mode", "paper", "--particles", "100"]
+    assert main([*words, "-o", "t.csv"]) == 0
+    assert len(set(threads)) == 1

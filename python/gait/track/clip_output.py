@@ -124,7 +124,7 @@ def write(
     """Write the estimates to all outputs, which appear together at the end.
 
     Keypoints, if there are any, show in which frames the person takes no strides, and in several cameras
-    where the joints are.  `also` receives the estimates with the joints of the model's body.
+    where the joints are.  If `also` is given, it receives all estimates, with the joints of the model's body.
     """
     model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
     with ExitStack() as stack:
@@ -151,12 +151,12 @@ def write(
             estimates = _smoothed(options, scene, tracker, estimates, plausibility)
         if keypoints is not None:
             estimates = Standing(keypoints).decided(estimates)
-        if not options.smooth:  # frames are tracked while earlier ones are written
-            estimates = stack.enter_context(closing(ahead(estimates)))
         if also is not None:
             estimates = _passed(estimates, also)
-        if keypoints is not None and scene.further:
+        elif keypoints is not None and scene.further:
             estimates = MeasuredJoints(tracker.cameras, keypoints).moved(estimates)
+        if not options.smooth:  # frames are tracked while earlier ones are written
+            estimates = stack.enter_context(closing(ahead(estimates)))
         for frame, estimate in estimates:
             for sink in sinks:
                 sink(frame, estimate)
