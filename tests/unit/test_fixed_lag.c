@@ -173,10 +173,10 @@ static void test_checks(void)
     for (int back = 1; back <= 30; back++) {
         CHECK(gait_tracker_lagged(t, back, &past, NULL) == GAIT_OK);
         int64_t const before = age - (past.utime - t->core->start_utime);
-        bool const doubtful = before >= 0 && before <= 700000;
-        CHECK(past.status == (doubtful ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING));
-        ambiguous += doubtful;
-        tracked += !doubtful;
+        bool const flagged = before >= 0 && before <= 700000;
+        CHECK(past.status == (flagged ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING));
+        ambiguous += flagged;
+        tracked += !flagged;
     }
     CHECK(ambiguous > 5 && tracked > 5);
     t->history.record[slot].flags &= ~GAIT_EST_OTHERS_FIT;
