@@ -90,7 +90,7 @@ static void test_people(void)
     CHECK(people(&p) == 2);
     for (int k = 0; k < 3 * GAIT_START_MAX_FRAMES; k++)
         people_add(&p, &CAMERA, START_KEEP + 40000 * (k + 1), &b[1], 1);
-    CHECK(people(&p) == 1 || people(&p) == 2);
+    CHECK(people(&p) == 1); /* 7.7 s, longer than the other is kept */
 }
 
 int main(void)
