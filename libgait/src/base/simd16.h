@@ -414,13 +414,6 @@ static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, u
     __m256i const nearer = _mm256_loadu_si256((const __m256i_u *)whole);
     _mm256_storeu_si256((__m256i_u *)whole, _mm256_or_si256(nearer, mine));
     _mm256_storeu_si256((__m256i_u *)visible, _mm256_andnot_si256(nearer, mine));
-#elif defined(SIMD16_NEON)
-    uint64x2_t const ones = vdupq_n_u64(~UINT64_C(0)), nearer = vld1q_u64(whole);
-    int64x2_t const both = vreinterpretq_s64_s32(vld1q_s32(span));
-    uint64x2_t const from = vshlq_u64(ones, vandq_s64(both, vdupq_n_s64(0xffffffff)));
-    uint64x2_t const mine = vbicq_u64(from, vshlq_u64(ones, vshrq_n_s64(both, 32)));
-    vst1q_u64(whole, vorrq_u64(nearer, mine));
-    vst1q_u64(visible, vbicq_u64(mine, nearer));
 #else
     for (int32_t i = 0; i < SIMD16_ROWS; i++) {
         uint64_t const mine = grid_from[span[2 * i]] & ~grid_from[span[2 * i + 1]], nearer = whole[i];
@@ -472,8 +465,7 @@ static inline simd4_f simd4_inside(simd4_f y, simd4_f from, simd4_f to, simd4_f 
 #if !defined(SIMD16_NEON)
 static inline __m128i two_words(const uint64_t *a, const uint64_t *b)
 {
-    __m128d const low = _mm_load_sd((const double *)(const void *)a);
-    return _mm_castpd_si128(_mm_loadh_pd(low, (const double *)(const void *)b));
+    return _mm_set_epi64x((int64_t)*b, (int64_t)*a);
 }
 #endif
 

@@ -60,12 +60,12 @@ static inline simd16_bytes simd16_conditions(const simd4_i v[4])
 /* Two numbers, each twice. */
 static inline simd4_f simd4_twice(const float *two)
 {
-#if defined(SIMD16_NEON)
     double both;
     memcpy(&both, two, sizeof both);
+#if defined(SIMD16_NEON)
     return (simd4_f)vdupq_n_f64(both);
 #else
-    return (simd4_f)_mm_loaddup_pd((const double *)(const void *)two);
+    return (simd4_f)_mm_set1_pd(both);
 #endif
 }
 
@@ -309,7 +309,7 @@ static inline simd16_tally simd16_tally_none(void)
     return t;
 }
 
-/* Add sixteen points where a condition holds, at most 255 times. pair[i & 1] is that of words [i]; its halves are -64 to
+/* Add sixteen points where a condition holds, at most 128 times. pair[i & 1] is that of words [i]; its halves are -64 to
  * 64. */
 static inline void simd16_tally_add(simd16_tally *t, const uint32_t *words, const simd4_i pair[2],
                                     simd16_bytes on)
