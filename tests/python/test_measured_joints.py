@@ -125,7 +125,25 @@ def test_frames_that_one_camera_missed_fade_to_the_models_joints() -> None:
     films = [frame._replace(others=(None,)) if frame.number >= 15 else frame for frame in frames(2)]
     after = [one for _, one in MeasuredJoints(CAMERAS, observed).moved(zip(films, track, strict=True))]
     moves = [np.abs(one.joints - before.joints).max() for one, before in zip(after, track, strict=True)]
-    assert moves[5] > moves[15] > moves[18] > 0.0 and max(moves[22:]) == 0.0
+    assert moves[5] > moves[17] > moves[19] > 0.0 and max(moves[22:]) == 0.0
+    sd = np.array([one.joint_sd[SHOWN].mean() for one in after])
+    assert (np.diff(sd[12:21]) > 0.0).all() and sd[20] < sd[21] == SD  # as fewer frames tell of it
+
+
+def test_joints_missed_in_some_frames_move_as_around_them() -> None:
+    track, true = walk()
+    observed, gap = keypoints(true, 2), [10, 13, 16]
+    k, point = SHOWN[4], 4
+    for view in (observed, *observed._further):
+        for frame in gap:
+            view._keypoints[0][frame].uv[point] = np.nan
+    whole, after = moved(track, keypoints(true, 2), 2), moved(track, observed, 2)
+    for frame in range(8, 19):
+        moves = [np.linalg.norm(one[frame].joints[k] - track[frame].joints[k]) for one in (whole, after)]
+        assert moves[1] > 0.9 * moves[0]
+        assert (after[frame].joint_sd[k] > whole[frame].joint_sd[k]).all()
+        rest = np.arange(len(NAMES)) != k
+        np.testing.assert_array_equal(after[frame].joints[rest], whole[frame].joints[rest])
 
 
 def test_estimates_wait_for_a_fifth_of_a_second_only() -> None:

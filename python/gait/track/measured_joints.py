@@ -7,10 +7,9 @@ measure it, so each joint of each frame becomes the mean of a posterior:
 
     prior       the tracker's joint, with its standard deviations
     likelihood  keypoints in all cameras, with the standard deviations of one frame and Student's t, as in the
-                keypoint term
+                keypoint term; averaged over the frames around, where one without keypoints tells nothing
 
-The moves are smoothed over time.  The pelvis moves with the hips.  Joints without keypoints, such as those of
-the head, stay.
+The pelvis moves with the hips.  Joints without keypoints, such as those of the head, stay.
 """
 
 from __future__ import annotations
@@ -50,8 +49,8 @@ class _Held:
 
     frame: Frame
     estimate: Estimate
-    moves: Array  #: (J, 3) metres, from the tracker's joints to those measured; 0 without keypoints
-    sd: Array  #: (J, 3) metres, of the latter
+    precision: Array  #: (J, 3, 3) of the move from the tracker's joint to the person's, 1 / metres^2
+    pull: Array  #: (J, 3) that precision times the move; both 0 where nothing was measured
 
 
 class MeasuredJoints:
@@ -85,20 +84,30 @@ class MeasuredJoints:
 
     @staticmethod
     def _smoothed(one: _Held, around: Iterable[_Held]) -> Estimated:
-        """Move the joints of a frame by the weighted mean of the moves around it."""
+        """Move the joints of a frame by what it and those around it tell of the moves."""
+        frame, estimate = one.frame, one.estimate
         near = [other for other in around if other.estimate.status != TrackStatus.LOST]
-        if one.estimate.status == TrackStatus.LOST:
-            return one.frame, one.estimate
-        apart = np.array([other.frame.time - one.frame.time for other in near]) / _SMOOTHING_S
-        moves = np.average([other.moves for other in near], axis=0, weights=np.exp(-0.5 * apart**2))
-        return one.frame, replace(one.estimate, joints=one.estimate.joints + moves, joint_sd=one.sd)
+        if estimate.status == TrackStatus.LOST or not any(other.precision.any() for other in near):
+            return frame, estimate
+        apart = np.array([other.frame.time - frame.time for other in near]) / _SMOOTHING_S
+        precision, pull = (
+            np.average(values, axis=0, weights=np.exp(-0.5 * apart**2))
+            for values in ([other.precision for other in near], [other.pull for other in near])
+        )
+        moves, joint_sd = posterior(estimate.joint_sd, precision, pull)
+        names = list(estimate.joint_names)
+        if set(names) >= {"pelvis", *_HIPS}:
+            hips, pelvis = [names.index(name) for name in _HIPS], names.index("pelvis")
+            moves[pelvis] = moves[hips].mean(axis=0)
+            joint_sd[pelvis] = joint_sd[hips].mean(axis=0)
+        return frame, replace(estimate, joints=estimate.joints + moves, joint_sd=joint_sd)
 
     def _measured(self, frame: Frame, estimate: Estimate) -> _Held:
         """Measure the joints in one frame."""
         names, joints = list(estimate.joint_names), estimate.joints
-        unmoved = _Held(frame, estimate, np.zeros(joints.shape), estimate.joint_sd)
+        nothing = _Held(frame, estimate, np.zeros((*joints.shape, 3)), np.zeros(joints.shape))
         if estimate.status == TrackStatus.LOST:
-            return unmoved
+            return nothing
         views = []
         found = self._keypoints.of_cameras(frame, estimate)
         for view, camera, points in zip((frame, *frame.others), self._cameras, found, strict=True):
@@ -111,14 +120,8 @@ class MeasuredJoints:
                 uv, sd = uv[other_sides(names)], sd[other_sides(names)]
             views.append((now, uv, sd))
         if len(views) < _LEAST_VIEWS:
-            return unmoved
-        places, joint_sd = posterior(joints, estimate.joint_sd, views)
-        moves = places - joints
-        if set(names) >= {"pelvis", *_HIPS}:
-            hips, pelvis = [names.index(name) for name in _HIPS], names.index("pelvis")
-            moves[pelvis] = moves[hips].mean(axis=0)
-            joint_sd[pelvis] = joint_sd[hips].mean(axis=0)
-        return _Held(frame, estimate, moves, joint_sd)
+            return nothing
+        return _Held(frame, estimate, *likelihood(joints, estimate.joint_sd, views))
 
 
 def _columns(points: FrameKeypoints, names: list[str]) -> tuple[Array, Array]:
@@ -131,20 +134,19 @@ def _columns(points: FrameKeypoints, names: list[str]) -> tuple[Array, Array]:
     return uv, sd
 
 
-def posterior(joints: Array, sd: Array, views: Sequence[tuple[Camera, Array, Array]]) -> tuple[Array, Array]:
-    """Means and standard deviations (J, 3) of joints in the world, metres.
+def likelihood(joints: Array, sd: Array, views: Sequence[tuple[Camera, Array, Array]]) -> tuple[Array, Array]:
+    """Precision (J, 3, 3) of the moves of joints in the world that keypoints tell, and it times these (J, 3).
 
     Parameters
     ----------
     joints, sd : (J, 3)
-        Those of the prior.
+        Those of the prior, metres.
     views : sequence of (Camera, (J, 2), (J,))
         Camera, keypoints (NaN where not found) and their standard deviations, pixels.
     """
-    prior = np.eye(3) / np.maximum(sd, 1e-6)[:, :, None] ** 2
     moves = np.zeros(joints.shape)
     for _ in range(_ROUNDS):
-        precision, right = prior.copy(), np.zeros(joints.shape)
+        precision, pull = np.zeros((*joints.shape, 3)), np.zeros(joints.shape)
         for camera, uv, error in views:
             expected, by_place = camera.project(joints + moves), slopes(camera, joints + moves)
             off = uv - expected
@@ -152,9 +154,16 @@ def posterior(joints: Array, sd: Array, views: Sequence[tuple[Camera, Array, Arr
             weight = np.nan_to_num((STUDENT_DEGREES + 2.0) / (STUDENT_DEGREES + square) / error**2)
             off = np.nan_to_num(off) + np.einsum("jax,jx->ja", by_place, moves)
             precision += np.einsum("j,jax,jay->jxy", weight, by_place, by_place)
-            right += np.einsum("j,jax,ja->jx", weight, by_place, off)
-        moves = np.linalg.solve(precision, right[..., None])[..., 0]
-    return joints + moves, np.sqrt(np.linalg.inv(precision).diagonal(axis1=1, axis2=2))
+            pull += np.einsum("j,jax,ja->jx", weight, by_place, off)
+        moves, _ = posterior(sd, precision, pull)
+    return precision, pull
+
+
+def posterior(sd: Array, precision: Array, pull: Array) -> tuple[Array, Array]:
+    """Means and standard deviations (J, 3) of moves with a prior's `sd` (J, 3) and a `likelihood`, metres."""
+    whole = np.eye(3) / np.maximum(sd, 1e-6)[:, :, None] ** 2 + precision
+    moves = np.linalg.solve(whole, pull[..., None])[..., 0]
+    return moves, np.sqrt(np.linalg.inv(whole).diagonal(axis1=1, axis2=2))
 
 
 def slopes(camera: Camera, points: Array) -> Array:
