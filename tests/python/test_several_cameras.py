@@ -189,6 +189,10 @@ def test_a_second_camera_shows_how_far_the_person_is(tmp_path, monkeypatch, caps
         (["--camera", "a.json"], "--camera: 1 for 2 films"),
         (["--camera", "a.json", "--camera", "b.json", "--offsets", "0,1"], "--offsets: 2 for 1 further"),
         (["--camera", "a.json", "--camera", "b.json", "--people", "all"], "--people: is for one film"),
+        (
+            ["--camera", "a.json", "--camera", "b.json", "--smooth", "--draws", "d.npz"],
+            "--draws: is for one film",
+        ),
         (["--camera", "three.toml"], "--camera: 3 for 2 films"),
         (["--camera", "three.toml", "--offsets", "soon"], "'soon' is not a list of seconds"),
     ],

@@ -263,6 +263,7 @@ def _cameras(args: argparse.Namespace) -> list[str]:
     alone = {
         "--people": args.people, "--keypoints": args.keypoints, "--camera-path": args.camera_path,
         "--stabilize": args.stabilize == "auto", "--cameras-out": args.cameras_out,
+        "--draws": args.draws,  # of the model's body, not of the joints that several cameras measure
         "--background with a file": args.background not in ("auto", "none"),
     }  # fmt: skip
     for option, given in alone.items():
