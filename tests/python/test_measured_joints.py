@@ -127,7 +127,7 @@ def test_frames_that_one_camera_missed_fade_to_the_models_joints() -> None:
     moves = [np.abs(one.joints - before.joints).max() for one, before in zip(after, track, strict=True)]
     assert moves[5] > moves[17] > moves[19] > 0.0 and max(moves[22:]) == 0.0
     sd = np.array([one.joint_sd[SHOWN].mean() for one in after])
-    assert (np.diff(sd[12:21]) > 0.0).all() and sd[20] < sd[21] == SD  # as fewer frames tell of it
+    assert (np.diff(sd[12:21]) > 0.0).all() and sd[20] < sd[21] == SD  # as fewer frames show it
 
 
 def test_joints_missed_in_some_frames_move_as_around_them() -> None:

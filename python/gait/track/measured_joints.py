@@ -7,7 +7,7 @@ measure it, so each joint of each frame becomes the mean of a posterior:
 
     prior       the tracker's joint, with its standard deviations
     likelihood  keypoints in all cameras, with the standard deviations of one frame and Student's t, as in the
-                keypoint term; averaged over the frames around, where one without keypoints tells nothing
+                keypoint term; averaged over the frames around, where one without keypoints shows nothing
 
 The pelvis moves with the hips.  Joints without keypoints, such as those of the head, stay.
 """
@@ -84,7 +84,7 @@ class MeasuredJoints:
 
     @staticmethod
     def _smoothed(one: _Held, around: Iterable[_Held]) -> Estimated:
-        """Move the joints of a frame by what it and those around it tell of the moves."""
+        """Move the joints of a frame by what it and those around it show of the moves."""
         frame, estimate = one.frame, one.estimate
         near = [other for other in around if other.estimate.status != TrackStatus.LOST]
         if estimate.status == TrackStatus.LOST or not any(other.precision.any() for other in near):
@@ -135,7 +135,7 @@ def _columns(points: FrameKeypoints, names: list[str]) -> tuple[Array, Array]:
 
 
 def likelihood(joints: Array, sd: Array, views: Sequence[tuple[Camera, Array, Array]]) -> tuple[Array, Array]:
-    """Precision (J, 3, 3) of the moves of joints in the world that keypoints tell, and it times these (J, 3).
+    """Precision (J, 3, 3) of the moves of joints in the world that keypoints show, and it times these (J, 3).
 
     Parameters
     ----------
