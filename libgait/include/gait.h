@@ -325,7 +325,7 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           float, rate_noise, , "1 per sqrt(second)", 0.055, 0.03, 0, 10)                                              \
     SETTING("Time in which stature and rate settle once phase, left and right are known.",                            \
           float, settle_time, , "seconds", 1, 0, 1e6)                                                                 \
-    PAPER("Time constant with which the stride rate returns to the model's mean; 0: never.",                          \
+    PAPER("Time constant of the stride rate's return to the mean, ten times longer with several classes; 0: never.",  \
           float, rate_time, , "seconds", 3, 0, 0, 1e6)                                                                \
     PAPER("Random walk of the pelvis along the heading.",                                                             \
           float, forward_noise, , "metres per sqrt(second)", 0.08, 0.06, 0, 100)                                      \
@@ -437,7 +437,7 @@ typedef GAIT_ENUM(gait_track_status) {
 #define GAIT_EST_NO_IMAGE   0x2u /* prediction only */
 #define GAIT_EST_DEGENERATE 0x4u /* effective sample size below 2 */
 #define GAIT_EST_UNSUPPORTED 0x8u /* the images do not show a person at the estimate */
-#define GAIT_EST_OTHERS_FIT  0x10u /* another body does so as well: turned, or in another phase */
+#define GAIT_EST_OTHERS_FIT  0x10u /* a different body fits as well, in the mean over 0.7 s: turned, or in another phase */
 
 /* Estimate after a frame. */
 #define GAIT_ESTIMATE_FIELDS(FIELD)                                                                                   \
@@ -496,8 +496,9 @@ GAIT_API gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera
 /* Broad prior: uniform phase, average stride rate and stature, unknown heading, pelvis at the origin; with several classes
  * also an unknown turn rate (sd 0.25 rad/s). */
 GAIT_API gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd, gait_error *err);
-/* Draw the particles from independent normals; a phase or heading with an sd of half a turn or more is uniform.  Means
- * must be in the ranges of gait_state, standard deviations in [0, 10]. */
+/* Draw the particles from independent normals; a phase or heading with an sd of half a turn or more is uniform, and half of
+ * the particles have the mean turn rate, the others one with 1.41 times the sd.  Means must be in the ranges of gait_state,
+ * standard deviations in [0, 10]. */
 GAIT_API gait_result gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
                                         gait_error *err);
 /* One frame: resample, rejuvenate, predict, weight, estimate.  A first frame at the start's time is not predicted. */
