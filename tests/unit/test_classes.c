@@ -5,6 +5,7 @@
 #include "sanitized.h"
 #include "toy_classes.h"
 #include "toy_film.h"
+#include "tracker/fit_check.h"
 #include "tracker/tracker.h"
 
 #include "check.h"
@@ -250,6 +251,32 @@ static void test_stops_and_walks_on(void)
     }
 }
 
+/* A standing person has no phase that fits as well; turned, the same body fits less. */
+static void test_fit_of_a_standing_person(void)
+{
+    static uint8_t wall[SCENE_PIXELS], shot[SCENE_PIXELS];
+    gait_tracker_config const cfg = settings();
+    gait_camera const cam = toy_camera(0);
+    gait_estimate e;
+    toy_wall(0, wall);
+    gait_tracker *const t = begin(&cfg, wall);
+    for (int n = 0; n < GO; n++) {
+        gait_state const true_state = truth(n, 1);
+        memcpy(shot, wall, sizeof shot);
+        toy_paint_of(model(), &cam, &true_state, shot);
+        toy_noise((uint32_t)n, shot);
+        const uint8_t *const shots[SCENE_CAMERAS] = {shot};
+        toy_tracker_step(t, n, shots, &e);
+    }
+    const state_layout *const of = &t->layouts[TOY_STAND];
+    particle_state const right = particle_from_state(of, &e.mean);
+    particle_state turned = right;
+    turned.f[F_HEADING] = m_wrap_pi(right.f[F_HEADING] + PI_F / 2.0f);
+    CHECK(e.motion_class == TOY_STAND && t->core->fit_margin > 0.0f);
+    CHECK(fit_check_score(t, of, &right) > 0.0f && fit_check_score(t, of, &turned) < 0.0f);
+    toy_tracker_free(t);
+}
+
 /* A person who stops while hidden is found standing there. */
 static void test_stops_while_hidden(void)
 {
@@ -402,6 +429,7 @@ static void all(void)
     test_resumes();
     test_starts();
     test_one_class();
+    test_fit_of_a_standing_person();
     if (!SANITIZED) {
         test_stops_and_walks_on();
         test_stops_while_hidden();

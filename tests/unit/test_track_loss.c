@@ -254,6 +254,9 @@ static void test_fit_is_averaged(void)
         t->core->fit_margin = fit_check_update(t, false, &t->layout, &turned);
     CHECK(t->core->fit_margin < 0.0f);
     CHECK(fit_check_update(t, true, &t->layout, &turned) > 0.0f);
+    t->cfg.mode = GAIT_MODE_PAPER; /* has no such check */
+    t->core->fit_margin = 0.25f;
+    CHECK(fit_check_update(t, false, &t->layout, &turned) == 0.25f);
     toy_tracker_free(t);
 }
 

@@ -10,7 +10,7 @@ static const float FIRST_SCORE = 1.0f;  /* initial value of the average, nats */
 static const float LEAST_SCORE = -3.0f, MOST_SCORE = 2.0f;
 
 /* The lanes of the bodies: turned by -90 to 90 degrees in steps of 30, the estimate in the middle; then a quarter of a stride
- * behind and ahead, which is nothing for a standing person. */
+ * behind and ahead, but not for a standing person, who has no phase. */
 enum { ESTIMATE = 3, BEHIND = 7, AHEAD, BODIES };
 
 float fit_check_score(gait_tracker *t, const state_layout *of, const particle_state *p)
