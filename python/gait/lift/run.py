@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -206,6 +206,7 @@ def lift_views(
         One line that names the file.
     """
     prepared: list[Prepared] = []
+    sided: list[Keypoints] = []  # with left and right as each view alone shows them, to find offsets
     cameras: list[Camera] = []
     began: list[float] = []
     for number, (path, keypoints, camera) in enumerate(views):
@@ -215,12 +216,16 @@ def lift_views(
 
         if keypoints is None:
             keypoints, _ = keypoints_file.read(path, prior.names, request.ignore_unknown, request.clip)
-        own = replace(request, camera=camera, keep_sides=True)  # the views together show the sides
-        one = prepare(path, keypoints, prior, own, named, quiet)
+        own = replace(request, camera=camera)
+        one = prepare(path, keypoints, prior, own, named, quiet, sides_later=not request.keep_sides)
         assert isinstance(one.view, Perspective)
+        sided.append(one.keypoints)
+        if offsets is None and not request.keep_sides:
+            with suppress(UserError):  # too little may be visible in one view
+                sided[-1] = prepare(path, keypoints, prior, own, lambda _: None, quiet).keypoints
         if number:
             given = None if offsets is None else offsets[number - 1]
-            found = find_offset(prepared[0].keypoints, cameras[0], one.keypoints, one.view.camera, given)
+            found = find_offset(sided[0], cameras[0], sided[-1], one.view.camera, given)
             if given is None and (found is None or not found.certain):
                 raise UserError(
                     f"{path}: the person's motion does not show its time offset from {views[0][0]}; "
@@ -232,7 +237,7 @@ def lift_views(
         prepared.append(one)
         cameras.append(one.view.camera)
     together, camera_of = joined([one.keypoints for one in prepared], began)
-    repairs = {"swapped": 0, "spikes": sum(one.repairs["spikes"] for one in prepared), "offsets_s": began}
+    repairs: dict[str, Any] = {"swapped": 0, "swaps": [], "spikes": 0, "left_out": [], "offsets_s": began}
     options = replace(request.options, pixel_sd=max(one.options.pixel_sd for one in prepared))
     several = Several(tuple(cameras), camera_of)
     whole = Prepared(together, several, options, repairs)
@@ -240,30 +245,41 @@ def lift_views(
     def lift(keypoints: Keypoints) -> Lifted:
         return lift_prepared(views[0][0], replace(whole, keypoints=keypoints), Edits(), prior, request, quiet)
 
-    lifted = lift(together) if request.keep_sides else best_sides(prior, together, several, options, lift)
-    for number, (path, _, _) in enumerate(views):
+    lifted = (
+        lift(together) if request.keep_sides else best_sides(prior, together, several, options, lift, quiet)
+    )
+    for number, ((path, _, _), one) in enumerate(zip(views, prepared, strict=True)):
+        repairs["spikes"] += one.repairs["spikes"]
+        repairs["left_out"] += [{"film": path, **point} for point in one.repairs["left_out"]]
         before, after = (each.among(camera_of == number) for each in (together, lifted.keypoints))
         if swapped := swaps.swapped_between(before, after):
             warn(f"{path}: {_named_swaps(swapped)}{' (--keep-sides)' * request.hints}")
+            repairs["swaps"] += [{"film": path, **span} for span in _spans(swapped)]
             repairs["swapped"] += int((after.visible & (after.uv != before.uv).any(axis=2)).sum())
     return replace(lifted, repairs=repairs)
 
 
 def prepare(
-    path: str, keypoints: Keypoints, prior: SegmentPrior, request: Request, warn: Warn, quiet: bool
+    path: str,
+    keypoints: Keypoints,
+    prior: SegmentPrior,
+    request: Request,
+    warn: Warn,
+    quiet: bool,
+    sides_later: bool = False,
 ) -> Prepared:
-    """Repair keypoints before lifting: swaps of left and right, spikes."""
+    """Repair keypoints before lifting: swaps of left and right, unless `sides_later`, and spikes."""
     options, hint = request.options, request.hints
     _check(path, keypoints, options.pixel_sd, warn)
     if not request.pixel_sd_given:
         options = replace(options, pixel_sd=measured_noise(keypoints, warn))
     view = _view(keypoints, request, warn)
     repairs: dict[str, Any] = {"swapped": 0, "swaps": [], "spikes": 0, "left_out": []}
-    if not request.keep_sides:
+    if not (request.keep_sides or sides_later):
         keypoints, found = _without_swaps(path, prior, keypoints, view, options, warn, quiet, hint)
         repairs |= found
     if not request.keep_spikes:
-        keypoints, found = _without_spikes(keypoints, options.pixel_sd, warn, hint)
+        keypoints, found = _without_spikes(keypoints, options.pixel_sd, warn, hint, sides_later)
         repairs |= found
     return Prepared(keypoints, view, options, repairs)
 
@@ -366,10 +382,14 @@ def _without_swaps(
     if swapped:
         warn(_named_swaps(swapped) + " (--keep-sides)" * hint)
     moved = (found.uv != keypoints.uv).any(axis=2) & keypoints.visible
-    spans = [
+    return found, {"swapped": int(moved.sum()), "swaps": _spans(swapped)}
+
+
+def _spans(swapped: list[swaps.Swapped]) -> list[dict[str, Any]]:
+    """List the joints and intervals of swaps for ``--json``."""
+    return [
         {"joint": each.joint, "first": first, "last": last} for each in swapped for first, last in each.spans
     ]
-    return found, {"swapped": int(moved.sum()), "swaps": spans}
 
 
 def _named_swaps(swapped: list[swaps.Swapped]) -> str:
@@ -385,10 +405,10 @@ def _named_swaps(swapped: list[swaps.Swapped]) -> str:
 
 
 def _without_spikes(
-    keypoints: Keypoints, sd: float, warn: Warn, hint: bool
+    keypoints: Keypoints, sd: float, warn: Warn, hint: bool, either_side: bool
 ) -> tuple[Keypoints, dict[str, Any]]:
-    """Remove spikes, and report them; also return their figures for ``--json``."""
-    keypoints, spikes = noise.without_spikes(keypoints, sd)
+    """Remove spikes (`either_side`: only those on both sides), and report them, also for ``--json``."""
+    keypoints, spikes = (swaps if either_side else noise).without_spikes(keypoints, sd)
     if spikes:
         named = ", ".join(f"{name} in frame {frame}" for frame, name in spikes[:MOST_NAMED])
         more = f" and {len(spikes) - MOST_NAMED} more" if len(spikes) > MOST_NAMED else ""

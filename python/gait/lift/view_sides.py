@@ -5,7 +5,7 @@ A swapped limb of one view does not fit the motion that the other frames and vie
 lifted together, limbs are swapped where that fits the motion better, and all is lifted again, until nothing
 changes.  If swaps are suspected in a view alone, or the motion fits poorly, too many may have been wrong to
 begin with: the view with the fewest suspects is lifted alone and shows the sides in the others, and the
-motion with the larger evidence is kept.
+motion with the larger evidence is kept.  At most, one view is lifted alone and all together 12 times.
 """
 
 from __future__ import annotations
@@ -25,12 +25,14 @@ from gait.lift.segment.view import Perspective, Several
 from gait.lift.smooth import motion
 from gait.lift.smooth.motion import Motion
 from gait.lift.smooth.options import Options
+from gait.progress import progress
 from gait.reproducible import one_thread
 from gait.track.measured_joints import mistaken_sides, other_sides
 
 Floats = npt.NDArray[np.float64]
 
-_ROUNDS = 5  # in each of which limbs are swapped and the views lifted again
+#: In each of which limbs are swapped and the views lifted again; sides where limbs meet may change for ever.
+_ROUNDS = 5
 
 
 class _Result(Protocol):
@@ -48,37 +50,57 @@ def best_sides(
     several: Several,
     options: Options,
     lift: Callable[[Keypoints], LiftedAs],
+    quiet: bool,
 ) -> LiftedAs:
-    """Lift the joined keypoints of several views by `lift`, with left and right as the motion shows them."""
-    lifted = _with_sides(keypoints, several, lift)
+    """Lift the joined keypoints of several views by `lift`, with left and right as the motion shows them.
+
+    UserError of `lift` only if it lifts from neither start.
+    """
+    found: list[LiftedAs] = []
+    refused: list[UserError] = []
+
+    def attempt(start: Keypoints) -> None:
+        try:
+            found.append(_with_sides(start, several, lift))
+        except UserError as error:
+            refused.append(error)
+
+    attempt(keypoints)
     views = range(len(several.cameras))
     suspected = [
         swaps.share_suspected(keypoints.among(several.of_point == view), options.pixel_sd) for view in views
     ]
-    if lifted.motion.chi2_per_observation <= motion.POOR_FIT and not any(suspected):
-        return lifted
-    begun = _sides_of(prior, keypoints, several, int(np.argmin(suspected)), options)
-    if begun is None:
-        return lifted
-    other = _with_sides(begun, several, lift)
-    return other if other.motion.evidence > lifted.motion.evidence else lifted
+    if found and found[0].motion.chi2_per_observation <= motion.POOR_FIT and not any(suspected):
+        return found[0]
+    begun = _sides_of(prior, keypoints, several, int(np.argmin(suspected)), options, quiet)
+    if begun is not None:
+        attempt(begun)
+    if not found:
+        raise refused[0]
+    return max(found, key=lambda one: one.motion.evidence)
 
 
 def _with_sides(keypoints: Keypoints, several: Several, lift: Callable[[Keypoints], LiftedAs]) -> LiftedAs:
-    """Lift, swap left and right where that fits the motion better, and lift again until nothing changes."""
+    """Lift, swap left and right where that fits the motion better, and lift again until nothing changes.
+
+    A motion that is refused after a swap does not count: the one before is returned.
+    """
     lifted = lift(keypoints)
     for _ in range(_ROUNDS):
         expected = [camera.project(lifted.motion.places) for camera in several.cameras]
         swapped = _on_nearer_sides(keypoints, several, expected, lifted.motion.names)
         if swapped is None:
             break
+        try:
+            lifted = lift(swapped)
+        except UserError:
+            break
         keypoints = swapped
-        lifted = lift(keypoints)
     return lifted
 
 
 def _sides_of(
-    prior: SegmentPrior, keypoints: Keypoints, several: Several, view: int, options: Options
+    prior: SegmentPrior, keypoints: Keypoints, several: Several, view: int, options: Options, quiet: bool
 ) -> Keypoints | None:
     """Swap left and right in other views where they then fit the motion that one view shows; None if nowhere.
 
@@ -86,10 +108,9 @@ def _sides_of(
     """
     own = keypoints.among(several.of_point == view)
     try:
-        with one_thread():
-            alone = motion.lift(
-                prior, own, Perspective(several.cameras[view]), options, motion.output_names(prior, own)
-            )
+        with one_thread(), progress("sides", motion.segments_of(prior, own), quiet) as update:
+            names = motion.output_names(prior, keypoints)  # also those that only other views show
+            alone = motion.lift(prior, own, Perspective(several.cameras[view]), options, names, update)
     except UserError:
         return None
     expected = []

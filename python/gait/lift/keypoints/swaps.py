@@ -255,7 +255,7 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
     if not joints:
         return keypoints, []
     observed = np.asarray(keypoints.visible[:, pairs].any(axis=2))
-    steady = _without_spikes(keypoints, pairs, sd)
+    steady, _ = without_spikes(keypoints, sd)
     wrong = _completed(keypoints, pairs, steady, suspected(steady, pairs, sd)) & observed
     wrong &= wrong.sum(axis=0) <= MOST_SWAPPED_SHARE * observed.sum(axis=0)
     for first, end in list(_intervals(keypoints, wrong)):
@@ -300,13 +300,20 @@ def _paired(keypoints: Keypoints) -> tuple[list[str], Ints]:
     return joints, np.array(columns, np.intp).reshape(-1, 2)
 
 
-def _without_spikes(keypoints: Keypoints, pairs: Ints, sd: float) -> Keypoints:
-    """Remove points that are spikes on whichever side they are, as they would decide about the others."""
-    kept, _ = noise.without_spikes(keypoints, sd)
+def without_spikes(keypoints: Keypoints, sd: float) -> tuple[Keypoints, list[tuple[int, str]]]:
+    """Remove points that are spikes on whichever side they are, so that none is removed for being swapped.
+
+    Returns what `noise.without_spikes` does.
+    """
+    _, pairs = _paired(keypoints)
+    kept, spikes = noise.without_spikes(keypoints, sd)
     jumped = np.asarray((keypoints.visible & ~kept.visible)[:, pairs].any(axis=2))
     other, _ = noise.without_spikes(_swapped(keypoints, pairs, jumped), sd)
     some = kept.visible | _swapped(other, pairs, jumped).visible
-    return replace(keypoints, uv=np.where(some[..., None], keypoints.uv, np.nan))
+    column = {name: j for j, name in enumerate(keypoints.names)}
+    row = {frame: t for t, frame in enumerate(keypoints.frame.tolist())}
+    spikes = [(frame, name) for frame, name in spikes if not some[row[frame], column[name]]]
+    return replace(keypoints, uv=np.where(some[..., None], keypoints.uv, np.nan)), spikes
 
 
 def _completed(keypoints: Keypoints, pairs: Ints, steady: Keypoints, wrong: Flags) -> Flags:
