@@ -76,6 +76,10 @@ HEAD = "frame,time,pelvis_u,pelvis_v"
         (f"{HEAD}\n0,0,,\n", "no point is visible"),
         (f"{HEAD},pelvis_u\n0,0,1,2,3\n", "pelvis_u appears twice"),
         (f"{HEAD},pelvis_c\n0,0,1,2,7\n", "pelvis_c is 7; give it from 0 to 1"),
+        (
+            f"{HEAD},pelvis_lasting_sd,pelvis_frame_sd\n0,0,1,2,1,2\n1,.1,1,2,2,2\n",
+            "line 3: pelvis_lasting_sd is 2, not less than pelvis_frame_sd, 2, which contains it; correct one",
+        ),
     ],
 )
 def test_faults_are_named(tmp_path, text, words):

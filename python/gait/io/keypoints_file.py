@@ -262,6 +262,12 @@ def read(
         else None
         for error in ("sd", "lasting_sd", "frame_sd")
     )
+    if lasting_sd is not None and frame_sd is not None and (lasting_sd >= frame_sd).any():
+        t, j = np.argwhere(lasting_sd >= frame_sd)[0]
+        raise UserError(
+            f"{path}: line {t + 2}: {names[j]}_lasting_sd is {lasting_sd[t, j]:g}, not less than "
+            f"{names[j]}_frame_sd, {frame_sd[t, j]:g}, which contains it; correct one of them"
+        )
     lasting_s, repeated = numbers.first("lasting_s", np.inf), numbers.first("repeated", 0.0)
     if not lasting_s > 0:
         raise UserError(f"{path}: line 2: lasting_s is {lasting_s:g}; give seconds above 0")
