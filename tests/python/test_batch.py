@@ -320,6 +320,7 @@ def test_an_interrupt_ends_the_commands(place):
             "[[clip]]\nvideos = ['a.mp4', 'b.mp4']\nkeypoints = 'k.csv'\nheight = 1.7\n",
             "videos cannot be combined with keypoints",
         ),
+        ("[[clip]]\nvideos = ['a.mp4', 'b.mp4']\nheight = 1.7\n", "cameras are missing; give the camera of"),
         (
             "[defaults]\nstop = 9\n[[clip]]\nkeypoints = 'k.json'\nmake = ['lift']\n",
             r"clip 1: stop is for a film, .*leave out stop here and in \[defaults\]",

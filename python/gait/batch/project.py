@@ -198,6 +198,8 @@ def _require(fields: Fields, clip: Clip) -> None:
         raise fields.fail("make", "has lift together with track, overlay or report", "make a clip of each")
     if len(clip.videos) > 1 and clip.keypoints:
         raise fields.fail("videos", "cannot be combined with keypoints", "give video, or leave out keypoints")
+    if len(clip.videos) > 1 and not clip.cameras:
+        raise fields.fail("cameras", "are missing", "give the camera of each film, here or in [defaults]")
     if clip.people and (clip.lifted or clip.keypoints):
         raise fields.fail(
             "people", "cannot be combined with lift or keypoints", "several people are tracked in a video"
