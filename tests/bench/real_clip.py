@@ -228,7 +228,7 @@ def _timing(clip: Clip, track: Track) -> tuple[float, float]:
     if used.sum() <= 15:
         return np.nan, np.nan
     frames, cycles = track.frame[used], np.unwrap(track.phase[used], period=1.0)
-    stride_hz = clip.fps * float(np.polyfit(frames, cycles, 1)[0])
+    stride_hz = clip.fps * abs(float(np.polyfit(frames, cycles, 1)[0]))  # the phase of backward walks falls
     late = [
         abs((np.interp(frame, frames, cycles) - phase + 0.5) % 1.0 - 0.5)
         for frame, phase in clip.strikes

@@ -59,6 +59,13 @@ def test_the_truth_is_good_and_on_time():
     assert score.error < 1e-6 and abs(score.stride_error) < 1e-6 and score.strike_error < 1e-3
 
 
+def test_a_phase_that_falls_backwards_has_the_same_rate():
+    back = replace(track(), phase=-track().phase)
+    strikes = [(frame, -phase) for frame, phase in clip().strikes]
+    score = real_clip.score(clip(strikes=strikes), back, CAMERAS)
+    assert abs(score.stride_error) < 1e-6 and 0 <= score.strike_error < 1e-3
+
+
 def test_a_rate_that_is_wrong_or_not_known_is_missed():
     strikes = [(frame + side, 0.5 * (side > 0)) for frame in (4.0, 30.0, 56.0) for side in (0.0, 13.5)]
     assert real_clip.rate_of(strikes, 26.0) == pytest.approx(1.0, rel=0.02)
