@@ -205,7 +205,9 @@ def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixt
     out = tmp_path / "m.gait"
     words = ["--class", "backwards", "--class", "stand", "--class", f"stroll={SHIPPED}"]
     assert main(["learn", str(SHIPPED), "-o", str(out), *words]) == 0
-    assert "classes walk backwards stand stroll" in capsys.readouterr().out
+    found = capsys.readouterr()
+    assert "classes walk backwards stand stroll" in found.out
+    assert "walk.gait: was learnt alone, so its strides are as long at every rate" in found.err
     model = gait.Model(out)
     assert model.classes == ("walk", "backwards", "stand", "stroll")
     assert model.class_info(3).components == model.info.components

@@ -72,6 +72,11 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         return _only_changes(own, options, note)
     if own is None:
         check(alone)
+    elif not class_names(own):
+        note(
+            f"{options.sources[0]}: was learnt alone, so its strides are as long at every rate, and slow "
+            "walks are followed worse; learn it again from its recordings, together with the classes"
+        )
     learnt, posture = dict[str, MotionClass](), None
     used = set[str]()  # files among the sources that are learnt as another class
     for name, source in wanted.items():
