@@ -1,7 +1,9 @@
 """Smoothing: the dynamics in numpy, the exact linear case, two modes, new starts, the command."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -19,6 +21,7 @@ from gait.io import blob
 from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.motion.footfalls import Draws
+from gait.track import smooth
 from gait.track.class_changes import ClassChanges
 from gait.track.smooth import Smoother, Spool, draw_motions, smoothed, with_later_checks
 
@@ -276,6 +279,18 @@ def test_the_frames_that_a_check_averages_over_are_flagged_up_to_a_start():
     ]
     flagged = [bool(found.flags & Flag.OTHERS_FIT) for _, found in with_later_checks(filtered)]
     assert [i for i, one in enumerate(flagged) if one] == [*range(10, 16), 20, 21, 22]
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "ours"),
+    [
+        ("fit_check.c", "AVERAGE_TIME =", smooth._CHECKED_S),
+        ("estimate.h", "DOMINANT_WEIGHT", smooth._DOMINANT_WEIGHT),
+    ],
+)
+def test_numbers_of_the_library_are_the_same_here(file, name, ours):
+    text = (Path(__file__).resolve().parents[2] / "libgait/src/tracker" / file).read_text()
+    assert [float(found) for found in re.findall(rf"{name} ([\d.]+)f", text)] == [ours]
 
 
 def test_a_clip_of_a_model_with_classes_is_smoothed():
