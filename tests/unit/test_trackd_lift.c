@@ -1,9 +1,26 @@
 /* Keypoints to 3-D in the daemon: a model without a segment prior, cameras, unknown names, times that do not advance. */
 #define _XOPEN_SOURCE 700 /* P_tmpdir */
+#include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "../../tools/trackd/lift_service.h"
+#include "gait_lift.h"
+
+static bool fails;
+
+/* The library's estimate, or one out of range. */
+static gait_result layer_estimate(gait_lift *lift, gait_lift_frame *frame, gait_error *err)
+{
+    gait_result const s = gait_lift_estimate(lift, frame, err);
+    if (fails)
+        snprintf(err->text, sizeof err->text, "observations are out of range");
+    return fails ? GAIT_ERR_NUMERIC : s;
+}
+
+#define gait_lift_estimate layer_estimate
+#include "../../tools/trackd/lift_service.c"
+#undef gait_lift_estimate
 #include "gaitmsg_tracks_t.h"
 
 #include "check.h"
@@ -98,6 +115,20 @@ static void test_names(void)
     CHECK(l.rejected == rejected + 1 && l.last == 9000000 + FRAME);
 }
 
+/* An estimate out of range is refused and counted; the next frames begin anew. */
+static void test_out_of_range(void)
+{
+    int64_t const rejected = l.rejected, lifted = l.lifted;
+    CHECK(keypoints(15000000, NULL, 24) && keypoints(15000000 + FRAME, NULL, 24));
+    fails = true;
+    CHECK(!keypoints(15000000 + 2 * FRAME, NULL, 24) && l.rejected == rejected + 1);
+    CHECK(strcmp(why.text, "keypoints: observations are out of range; the lift restarts") == 0);
+    fails = false;
+    CHECK(keypoints(15000000 + 3 * FRAME, NULL, 24) && l.rejected == rejected + 1 && l.lifted == lifted);
+    CHECK(keypoints(15000000 + 4 * FRAME, NULL, 24) && keypoints(15000000 + 5 * FRAME, NULL, 24) &&
+          l.lifted > lifted);
+}
+
 /* Any estimate that is sent is finite. */
 static void test_absurd(void)
 {
@@ -122,6 +153,7 @@ int main(void)
     test_camera();
     test_times();
     test_names();
+    test_out_of_range();
     test_absurd();
     lift_service_close(&l);
     unlink(segments);

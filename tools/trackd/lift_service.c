@@ -104,6 +104,14 @@ static bool finite_joints(const gaitmsg_estimate_t *m)
     return finite;
 }
 
+/* Forget keypoints that gave no usable estimate. */
+static bool restart(lift_service *s, const char *reason, message *why)
+{
+    gait_lift_reset(s->lift);
+    s->rejected++;
+    return message_set(why, "keypoints: %s; the lift restarts", reason);
+}
+
 /* Publish the estimate if it is finite. */
 static bool send(lift_service *s, int64_t step_us, message *why)
 {
@@ -131,11 +139,8 @@ static bool send(lift_service *s, int64_t step_us, message *why)
             s->joint[j].sd[i] = (float)e->sd[j][i];
         }
     }
-    if (!finite_joints(&m)) {
-        gait_lift_reset(s->lift);
-        s->rejected++;
-        return message_set(why, "keypoints gave joints that are not finite; the lift restarts");
-    }
+    if (!finite_joints(&m))
+        return restart(s, "joints are not finite", why);
     sink_publish(s->out, "GAIT_LIFT", s->person, encoded,
                  gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, &m));
     s->lifted++;
@@ -179,8 +184,10 @@ bool lift_service_keypoints(lift_service *s, keypoints_view *v, int64_t receive_
         return message_set(why, "keypoints: %s", err.text);
     }
     s->past[s->frames % LIFT_SERVICE_PAST] = (lift_past){v->utime, v->frame, receive_utime};
-    bool const ready = gait_lift_estimate(s->lift, &s->estimate, NULL) == GAIT_OK;
+    gait_result const found = gait_lift_estimate(s->lift, &s->estimate, &err);
     int64_t const step_us = clock_monotonic() - before;
     histogram_add(&s->step, step_us);
-    return !ready || send(s, step_us, why);
+    if (found == GAIT_ERR_STATE) /* too few frames yet */
+        return true;
+    return found == GAIT_OK ? send(s, step_us, why) : restart(s, err.text, why);
 }

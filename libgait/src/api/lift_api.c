@@ -182,7 +182,8 @@ static void describe_fit(const gait_lift *l, const lift_outcome *found, gait_lif
 
 static gait_result out_of_range(const char *function, const char *what, gait_error *err)
 {
-    return base_fail(err, GAIT_ERR_NUMERIC, -1, "%s: %s out of range", function, what);
+    return base_fail(err, GAIT_ERR_NUMERIC, -1,
+                     "%s: %s out of range; give uv and sd in pixels, stature in metres", function, what);
 }
 
 gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
