@@ -85,11 +85,15 @@ static void test_check(void)
         {48, 32, 50, 50, 24, -INFINITY, "principal point"},
         {48, 32, 50, 50, 6.6f, 16, "principal point"},
         {48, 32, 50, 50, 24, 26.8f, "principal point"},
+        {48, 32, 50, 50, 11.5f, 7.5f, "principal point (11.5, 7.5) is not near"}, /* of 24x16 */
+        {48, 32, 50, 50, 29.1f, 19.3f, "principal point"},                        /* of 59x40 */
     };
     message why;
     gait_camera c = CAMERA, out;
     CHECK(camera_check(&c, 48 * 32, &why));
     c.cx = 6.8f, c.cy = 26.6f; /* 35 % off the middle */
+    CHECK(camera_check(&c, 48 * 32, &why));
+    c.cx = 28.1f, c.cy = 18.6f; /* on both axes alike, but less than 10 % */
     CHECK(camera_check(&c, 48 * 32, &why));
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         c = CAMERA;

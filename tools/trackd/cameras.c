@@ -27,12 +27,16 @@ static bool check_rotation(const gait_camera *camera, const char *name, message 
                        name);
 }
 
-/* Whether the principal point is near the middle of the picture, as Python requires of every file. */
+/* Whether the principal point is near the middle of the picture and not that of a resized one, as Python requires of every
+ * file. */
 static bool check_middle(const gait_camera *c, const char *name, message *why)
 {
-    float const most = 0.35f; /* offset in pictures */
-    float const x = (c->cx + 0.5f) / (float)c->width - 0.5f, y = (c->cy + 0.5f) / (float)c->height - 0.5f;
-    return (fabsf(x) <= most && fabsf(y) <= most) ||
+    float const cropped = 0.7f, resized = 0.2f, alike = 0.05f;
+    /* sizes of the picture of which it is the middle, relative to this one's */
+    float const x = (2 * c->cx + 1) / (float)c->width, y = (2 * c->cy + 1) / (float)c->height;
+    bool const near = fabsf(x - 1) <= cropped && fabsf(y - 1) <= cropped;
+    bool const other = fmaxf(fabsf(x - 1), fabsf(y - 1)) > resized && fabsf(x - y) < alike * fmaxf(x, y);
+    return (near && !other) ||
            message_set(why, "%s: principal point (%g, %g) is not near the middle of %dx%d pixels; %s", name,
                        (double)c->cx, (double)c->cy, c->width, c->height, "give cx and cy for this size");
 }
