@@ -388,23 +388,75 @@ static void test_own(void)
     s.state = GAITMSG_STATUS_T_RUNNING;
 }
 
-/* Of two daemons with one file the first to notice leaves it to the other. */
+/* What another program that writes the file leaves at a time, in seconds. */
+static void write_other(snapshot_file *other, time_t time)
+{
+    struct timespec const times[2] = {{.tv_sec = time}, {.tv_sec = time}};
+    snapshot_file_write(other, &s, true);
+    CHECK(utimensat(AT_FDCWD, path, times, 0) == 0);
+}
+
+/* Of two daemons with one file the first to notice leaves it to the other, and reports it, until that one has ended. */
 static void test_two_writers(void)
 {
     snapshot_file f = {.path = path}, other = {.path = path};
     struct timespec const long_ago[2] = {{0}};
+    char moved[96];
+    snprintf(moved, sizeof moved, "%s.moved", path);
     for (int i = 0; i < 2; i++) { /* the time of a file alone shows nothing */
         snapshot_file_write(&f, &s, true);
-        CHECK(utimensat(AT_FDCWD, path, long_ago, 0) == 0 && f.path);
+        CHECK(utimensat(AT_FDCWD, path, long_ago, 0) == 0 && f.own && !s.complaint.text[0]);
     }
-    snapshot_file_write(&other, &s, true);
-    CHECK(utimensat(AT_FDCWD, path, long_ago, 0) == 0);
+    for (int i = 1; i < 6; i++) {
+        write_other(&other, i);
+        for (int k = 0; k < SNAPSHOT_LEFT; k++) /* also without a person */
+            s.state = k ? GAITMSG_STATUS_T_READY : GAITMSG_STATUS_T_RUNNING,
+            snapshot_file_write(&f, &s, true);
+        s.state = GAITMSG_STATUS_T_RUNNING;
+        CHECK(!f.own && other.own && strstr(s.complaint.text, "another program writes it, too"));
+    }
+    snapshot_file_write(&f, &s, true);
+    CHECK(f.own);
+    write_file(moved, "of a summer", 11);
+    CHECK(rename(moved, path) == 0 && utimensat(AT_FDCWD, path, long_ago, 0) == 0);
+    for (int k = 0; k <= 2 * SNAPSHOT_LEFT; k++)
+        snapshot_file_write(&f, &s, true);
+    CHECK(!f.own && !is_replaceable(path)); /* what is not a snapshot is left as it is for good */
+    s.complaint.text[0] = '\0';
+    unlink(path);
+}
+
+/* A file that was resumed or could not be written is as much looked after as one that was written. */
+static void test_two_readers(void)
+{
+    snapshot_file f = {.path = path}, other = {.path = path};
+    CHECK(save(0, 0));
+    snapshot_file_resume(&f, &s);
+    CHECK(f.own);
+    write_other(&other, 1);
     s.state = GAITMSG_STATUS_T_READY;
     snapshot_file_write(&f, &s, true);
-    CHECK(!f.path && access(path, F_OK) == 0);
+    CHECK(!f.own && access(path, F_OK) == 0);
     s.state = GAITMSG_STATUS_T_RUNNING;
-    snapshot_file_write(&other, &s, true);
-    CHECK(other.path && other.own);
+    f = (snapshot_file){.path = path};
+    snapshot_file_write(&f, &s, true);
+    no_memory = true;
+    snapshot_file_write(&f, &s, true);
+    no_memory = false;
+    CHECK(f.failed && f.own);
+    other = (snapshot_file){.path = path};
+    write_other(&other, 2);
+    snapshot_file_write(&f, &s, true);
+    CHECK(!f.own && f.left == SNAPSHOT_LEFT);
+    f = (snapshot_file){.path = path};
+    snapshot_file_write(&f, &s, true);
+    called = 0, fail_at = 7,
+    fail_with = EIO; /* the new file has its name, but the folder is not on the disk */
+    snapshot_file_write(&f, &s, true);
+    CHECK(f.failed);
+    fail_at = 0;
+    snapshot_file_write(&f, &s, true);
+    CHECK(!f.failed && f.own && f.left == 0);
     unlink(path);
 }
 
@@ -423,6 +475,7 @@ int main(void)
     test_leftovers();
     test_own();
     test_two_writers();
+    test_two_readers();
     test_large();
     unlink(path);
     unlink(model);

@@ -161,8 +161,8 @@ static int create_beside(const char *path, char *beside, size_t capacity)
 }
 
 /* Write beside the file, then rename; returns 0 or an errno.  After a loss of power the old or the new file is there,
- * complete. */
-static int replace(const char *path, const unsigned char *data, size_t bytes)
+ * complete.  `written` becomes that of the new file, if it has its name. */
+static int replace(const char *path, const unsigned char *data, size_t bytes, struct stat *written)
 {
     char beside[OPTION_TEXT + 32];
     int const file = create_beside(path, beside, sizeof beside);
@@ -177,6 +177,8 @@ static int replace(const char *path, const unsigned char *data, size_t bytes)
         unlink(beside);
         return fault;
     }
+    if (lstat(path, written) != 0)
+        written->st_ino = 0;
     int const folder = open_folder(path);
     if (folder < 0 || (fsync(folder) != 0 && errno != EINVAL))
         fault = errno;
@@ -244,44 +246,50 @@ bool snapshot_file_check(const snapshot_file *f, message *why)
     return true;
 }
 
-/* Whether another program has replaced the file since it was written here: neither a new time alone shows it nor, as some
- * file systems make one for every look, a new number. */
-static bool is_replaced(const snapshot_file *f)
+/* Whether another program has replaced the file since the last look: neither a new time alone shows it nor, as some file
+ * systems make one for every look, a new number. */
+static bool is_replaced(snapshot_file *f)
 {
-    const struct stat *const own = &f->written;
-    struct stat is;
-    return own->st_ino && lstat(f->path, &is) == 0 && is.st_ino != own->st_ino &&
-           (is.st_mtim.tv_sec != own->st_mtim.tv_sec || is.st_mtim.tv_nsec != own->st_mtim.tv_nsec);
+    struct stat const before = f->last;
+    return before.st_ino && lstat(f->path, &f->last) == 0 && f->last.st_ino != before.st_ino &&
+           (f->last.st_mtim.tv_sec != before.st_mtim.tv_sec ||
+            f->last.st_mtim.tv_nsec != before.st_mtim.tv_nsec);
 }
 
-void snapshot_file_write(snapshot_file *f, const service *s, bool at_once)
+/* Whether the file is left to another program, until it has stayed as it is for some periods and is a snapshot. */
+static bool is_left(snapshot_file *f, service *s)
+{
+    if (is_replaced(f)) {
+        service_complain(s, "--snapshot %.160s: another program writes it, too; give each its own", f->path);
+        f->left = SNAPSHOT_LEFT;
+        f->own = false;
+    } else if (f->left > 0 && is_replaceable(f->path))
+        f->left--;
+    return f->left > 0;
+}
+
+void snapshot_file_write(snapshot_file *f, service *s, bool at_once)
 {
     int64_t const now = clock_monotonic();
     if (!f->path || (!at_once && now < f->due))
         return;
     f->due = now + f->period;
-    if (is_replaced(f)) {
-        log_line("--snapshot %.160s: another program writes it, too; give each its own", f->path);
-        f->path = NULL;
+    if (is_left(f, s))
         return;
-    }
-    f->written.st_ino = 0;
     if (!anyone(s)) {
-        if (f->own)
-            unlink(f->path);
+        if (f->own && unlink(f->path) == 0)
+            f->last.st_ino = 0;
         f->own = false;
         return;
     }
     size_t bytes = 0;
     unsigned char *const data = encode(s, &bytes);
-    int const fault = data ? replace(f->path, data, bytes) : ENOMEM;
+    int const fault = data ? replace(f->path, data, bytes, &f->last) : ENOMEM;
     free(data);
     if (fault && !f->failed)
         log_line("--snapshot %.160s: cannot be written: %s", f->path, strerror(fault));
     f->failed = fault != 0;
     f->own = f->own || !fault;
-    if (!fault && lstat(f->path, &f->written) != 0)
-        f->written.st_ino = 0;
 }
 
 /* ---- reading ---- */
@@ -398,8 +406,10 @@ void snapshot_file_resume(snapshot_file *f, service *s)
     if (!f->path)
         return;
     f->due = clock_monotonic() + f->period; /* do not delay the first frame */
-    if (access(f->path, F_OK) != 0)
+    if (lstat(f->path, &f->last) != 0) {
+        f->last.st_ino = 0;
         return;
+    }
     if (!file_read(f->path, "snapshot", SNAPSHOT_MOST, &file, &why)) {
         log_line("%s", why.text);
         return;
