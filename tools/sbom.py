@@ -57,13 +57,11 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
     """Add to the bill what packages contain, what is compiled into libgait, and what is downloaded."""
     locked = hashes_of(LOCK.read_text())
     packages = [described(one, locked) | within(one["name"]) for one in document["components"]]
-    eigen = {
+    eigen = described({"name": "cmeel-eigen", "version": version("cmeel-eigen")}, locked) | {
         "type": "library",
         "name": "Eigen",
-        "version": version("cmeel-eigen"),
         "description": "headers, compiled into libgait (libgait/src/base/linalg.cpp)",
         "licenses": [{"license": {"id": "MPL-2.0"}}],
-        "externalReferences": [release("cmeel-eigen", version("cmeel-eigen"), locked)],
     }
     return document | {"components": [*packages, eigen, *system_jpeg(), *map(fetched, LICENCES)]}
 

@@ -6,16 +6,24 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import pytest
+
 from gait.detect import weights
 from gait.web import parts
 
 SCRIPT = Path(__file__).resolve().parents[2] / "tools/sbom.py"
 
 
-def test_the_bill_has_what_is_compiled_in_inside_wheels_and_fetched():
+@pytest.fixture
+def sbom():
+    """The script as a module."""
     spec = importlib.util.spec_from_file_location("sbom", SCRIPT)
-    sbom = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(sbom)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_bill_has_what_is_compiled_in_inside_wheels_and_fetched(sbom):
     packages = [{"name": "av", "type": "library"}, {"name": "no-such-package", "type": "library"}]
     lock = sbom.LOCK.read_text()
     number = re.search(r"^lcm==(\S+)", lock, re.MULTILINE)[1]
@@ -42,3 +50,9 @@ def test_the_bill_has_what_is_compiled_in_inside_wheels_and_fetched():
     assert ("libjpeg" in found) == (asked is not None and asked.returncode == 0)
     for file in (*weights.STORE.files, *parts.STORE.files):
         assert found[file.file]["hashes"] == [{"alg": "SHA-256", "content": file.sha256}]
+
+
+def test_an_eigen_other_than_the_locked_one_has_no_hashes(sbom, monkeypatch):
+    monkeypatch.setattr(sbom, "version", lambda _: "0.1")
+    found = {one["name"]: one for one in sbom.complete({"components": []})["components"]}
+    assert found["Eigen"]["version"] == "0.1" and "externalReferences" not in found["Eigen"]
