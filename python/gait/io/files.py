@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 from gait.errors import UserError, unreadable
@@ -86,10 +87,10 @@ def flush(descriptor: int) -> None:
             raise
 
 
-def lock(descriptor: int, path: str | os.PathLike[str]) -> None:
+def lock(descriptor: int, path: str | os.PathLike[str], kind: int = fcntl.LOCK_EX) -> None:
     """Lock an open file until it is closed; UserError if another program has, as it writes the file."""
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
     except BlockingIOError:
         raise UserError(f"{path}: another program is writing this file; give another name") from None
 
@@ -98,7 +99,7 @@ def require_unlocked(path: str | os.PathLike[str]) -> None:
     """Raise UserError if another program is writing an existing file in place, as gait-trackd writes logs."""
     if Path(path).is_file():
         with open(path, "rb") as file:
-            lock(file.fileno(), path)
+            lock(file.fileno(), path, fcntl.LOCK_SH)  # does not disturb others that only look
 
 
 def _recover(target: Path) -> None:
@@ -118,11 +119,13 @@ def _recover(target: Path) -> None:
 
 def end_at_a_row(table: Path) -> bool:
     """Cut off an incomplete last row; return whether any rows remain below the header."""
+    if table.stat().st_size == 0:
+        return False
     with table.open("r+b") as file:
-        whole = file.read()
-        whole = whole[: whole.rfind(b"\n") + 1]
-        file.truncate(len(whole))
-    return whole.count(b"\n") > 1
+        with mmap(file.fileno(), 0, access=ACCESS_READ) as whole:
+            first, last = whole.find(b"\n") + 1, whole.rfind(b"\n") + 1
+        file.truncate(last)
+    return last > first
 
 
 def is_unfinished(path: str | os.PathLike[str]) -> bool:
