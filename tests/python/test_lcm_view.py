@@ -520,6 +520,51 @@ def test_a_request_has_to_come_in_time(sent, page, monkeypatch):
     assert get(page, "state").status == 200
 
 
+class Clock:
+    """An event loop whose time is set."""
+
+    def __init__(self):
+        self.now, self.due = 0.0, {}
+
+    def time(self):
+        return self.now
+
+    def call_at(self, when, function):
+        timer = SimpleNamespace(when=lambda: when, cancel=lambda: self.due.pop(id(timer)))
+        self.due[id(timer)] = when
+        return timer
+
+    def create_task(self, coroutine, **_):
+        coroutine.close()
+        return asyncio.Future(loop=self)
+
+    def get_debug(self):
+        return False
+
+
+def test_each_part_of_a_body_has_its_time_and_all_have_a_limit():
+    async def nothing(scope, receive, send):
+        """Handle no request."""
+
+    clock = Clock()
+    server = serve._server(nothing, lambda: None)
+    server.config.load()
+    one = server.config.http_protocol_class(server.config, server.server_state, {}, clock)
+    one.connection_made(SimpleNamespace(get_extra_info=lambda _: None, abort=lambda: None))
+
+    def received(now, data):
+        clock.now = now
+        one.data_received(data)
+        return list(clock.due.values())
+
+    assert received(1.0, b"POST / HTTP/1.1\r\n") == [serve.REQUEST_S]  # of the head as a whole
+    assert received(3.0, b"Host: x\r\nContent-Length: 100\r\n\r\n") == [3.0 + serve.REQUEST_S]
+    for now in (7.0, 11.0):
+        assert received(now, b"part") == [now + serve.REQUEST_S]
+    assert received(serve.BODY_S - 1.0, b"part") == [serve.BODY_S]
+    assert received(serve.BODY_S - 0.5, b"rest" * 22) == []
+
+
 def test_an_answer_has_to_be_read_in_time(monkeypatch):
     monkeypatch.setattr(serve, "ANSWER_S", 0.1)
     ended = threading.Event()

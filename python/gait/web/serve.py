@@ -28,7 +28,8 @@ from gait.web import modules
 HOST = "127.0.0.1"
 MOST_CONNECTIONS = 128  # of browsers, each of which opens up to six; further ones are refused
 MOST_WAITING = 64  # of these that have not sent a whole request; a further one ends the oldest
-REQUEST_S = 5.0  # seconds that a browser has to send a request
+REQUEST_S = 5.0  # seconds that a browser has to send a request up to its body, and then each part of that
+BODY_S = 120.0  # seconds that it has to send everything
 ANSWER_S = 30.0  # seconds that it may leave an answer unread
 STREAMS_END = 3  # seconds that event streams have to end when the server does
 _NAMES = (HOST, "localhost", "[::1]")
@@ -237,6 +238,7 @@ class _Connection(H11Protocol):
     """A connection that ends if it does not send a whole request, or does not read an answer, in time."""
 
     _late: asyncio.TimerHandle | None = None  # runs while the rest of a request is expected
+    _end_at = math.inf  # when the whole request must have come, in the loop's time
     _unread: asyncio.TimerHandle | None = None  # runs while an answer waits
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -252,7 +254,7 @@ class _Connection(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
-        self._watch()
+        self._watch(more=self.conn.their_state is h11.SEND_BODY)
 
     def on_response_complete(self) -> None:
         super().on_response_complete()
@@ -268,13 +270,16 @@ class _Connection(H11Protocol):
         self.connections.discard(self)
         self.transport.abort()
 
-    def _watch(self) -> None:
-        owes = self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
-        if owes and not self._late:
-            self._late = self.loop.call_later(REQUEST_S, self._end)
-        elif self._late and not owes:
+    def _watch(self, more: bool = False) -> None:
+        owes, now = self.conn.their_state in (h11.IDLE, h11.SEND_BODY), self.loop.time()
+        if self._late and (more or not owes):
             self._late.cancel()
             self._late = None
+        if not owes:
+            self._end_at = math.inf
+        elif not self._late:
+            self._end_at = min(self._end_at, now + BODY_S)
+            self._late = self.loop.call_at(min(now + REQUEST_S, self._end_at), self._end)
 
     def pause_writing(self) -> None:
         super().pause_writing()
