@@ -629,10 +629,12 @@ $(MANUAL): tools/man.py $(wildcard python/gait/cli/*.py) $(PAGED) | $(READY) bui
 # Its LCM, which no Debian package has, lies beside it in lib/gait, its licence with the notices.
 install-daemon: tools $(MANUAL)
 	install -d '$(DESTDIR)$(PREFIX)/bin' '$(DESTDIR)$(PREFIX)/lib/gait' '$(DESTDIR)$(PREFIX)/lib/systemd/system' \
-	    '$(DESTDIR)$(PREFIX)/share/man/man1' '$(DESTDIR)$(PREFIX)/share/gait/lcm_types'
+	    '$(DESTDIR)$(PREFIX)/share/man/man1' '$(DESTDIR)$(PREFIX)/share/gait/lcm_types' \
+	    '$(DESTDIR)$(PREFIX)/share/doc/libgait'
 	install -m 755 $(BIN)/gait-trackd '$(DESTDIR)$(PREFIX)/bin/'
 	install -m 755 $(LCM)/lib/liblcm.so.1 '$(DESTDIR)$(PREFIX)/lib/gait/'
-	install -m 644 $(firstword $(wildcard $(SITE)/lcm-*.dist-info/licenses/COPYING)) \
+	install -m 644 $(or $(firstword $(wildcard $(SITE)/lcm-*.dist-info/licenses/COPYING)), \
+	    $(error install-daemon: no licence of lcm in $(SITE); remove $(READY), then `make setup`)) \
 	    '$(DESTDIR)$(PREFIX)/share/doc/libgait/lcm-COPYING'
 	install -m 644 $(LCM_TYPES) '$(DESTDIR)$(PREFIX)/share/gait/lcm_types/'
 	install -m 644 $(addprefix python/gait/data/,walk.gait paper.gait classes.gait) '$(DESTDIR)$(PREFIX)/share/gait/'

@@ -58,6 +58,15 @@ def test_install_puts_everything_and_uninstall_removes_it(installed):
     assert not [p for p in installed.rglob("*") if not p.is_dir()]
 
 
+def test_the_daemon_can_be_installed_alone(tmp_path):
+    done = make("install-daemon", f"DESTDIR={tmp_path}", "PREFIX=/opt/gait")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "opt/gait/bin/gait-trackd").exists()
+    assert (tmp_path / "opt/gait/share/doc/libgait/lcm-COPYING").exists()
+    absent = make("install-daemon", f"DESTDIR={tmp_path}", f"SITE={tmp_path}")
+    assert absent.returncode != 0 and "no licence of lcm in" in absent.stderr
+
+
 def test_the_installed_daemon_runs_by_itself(installed):
     prefix = installed / "opt/gait"
     config = (prefix / "share/gait/trackd.toml").read_text().replace("/opt/gait", str(prefix))
