@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gait import Video
+from gait import Video, VideoWriter
 from gait.body.skeleton import axis_rotation
+from gait.camera.camera import read_camera
 from gait.cli import main
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
@@ -18,6 +19,7 @@ from gait.io.video import Frame
 from gait.simulate.clip import simulate
 from gait.simulate.scenario import PRESETS
 from gait.simulate.stage import set_stage
+from gait.track import scene
 from gait.track.further_cameras import SeveralVideos
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.synchronise import find_offset
@@ -256,3 +258,36 @@ def test_one_thread_chooses_keypoints(tmp_path, monkeypatch):
     words += ["--offsets", "0", "--init", "init.json", "--mode", "paper", "--particles", "100"]
     assert main([*words, "-o", "t.csv"]) == 0
     assert len(set(threads)) == 1
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("smooth", [[], ["--smooth"]])
+def test_joints_are_measured_as_well_before_a_film_ends(smooth, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    simulate(SCENARIO, ".")
+    seen = (*JOINTS, "l_shoulder", "r_shoulder")
+    truth, half = read_truth("truth.csv"), FRAMES // 2
+    with VideoWriter("short.mp4", FPS) as writer:
+        for frame in Video("video_2.mp4").frames(0, half):
+            writer.write(frame.image)
+
+    def detected(options, video, frames):
+        camera, random = read_camera(options.camera), np.random.default_rng(1)
+        uv = np.stack([camera.project(truth.places[name][list(frames)]) for name in seen], axis=1)
+        uv = uv + 0.3 * random.standard_normal(uv.shape)
+        ones = np.ones(uv.shape[:2])
+        return {0: Keypoints(np.array(frames), np.array(frames) / FPS, seen, uv, ones)}, 0
+
+    monkeypatch.setattr(scene, "_detect", detected)
+    monkeypatch.setattr(scene, "_require_detector", lambda options: None)
+    monkeypatch.setattr(scene, "detects", lambda options: True)
+    errors = {}
+    for film in ("video_2.mp4", "short.mp4"):
+        words = ["track", "video.mp4", film, "--camera", "camera.json", "--camera", "camera_2.json", *smooth]
+        words += ["--offsets", "0", "--init", "init.json", "--particles", "300", "-o", "t.csv"]
+        assert main(words) == 0
+        track = read_estimates("t.csv")
+        off = [track.places[name] - truth.places[name][track.frame] for name in seen]
+        errors[film] = np.linalg.norm(off, axis=2).mean(axis=0)
+    last = slice(half - 3, half)  # whose surroundings have frames of one camera
+    assert errors["short.mp4"][last].mean() < 1.12 * errors["video_2.mp4"][last].mean()
