@@ -78,7 +78,7 @@ HEAD = "frame,time,pelvis_u,pelvis_v"
         (f"{HEAD},pelvis_c\n0,0,1,2,7\n", "pelvis_c is 7; give it from 0 to 1"),
         (
             f"{HEAD},pelvis_lasting_sd,pelvis_frame_sd\n0,0,1,2,1,2\n1,.1,1,2,2,2\n",
-            "line 3: pelvis_lasting_sd is 2, not less than pelvis_frame_sd, 2, which contains it; correct one",
+            "line 3: pelvis_lasting_sd is 2, not less than pelvis_frame_sd, 2, which contains it; correct",
         ),
     ],
 )
