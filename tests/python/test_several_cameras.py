@@ -265,7 +265,7 @@ def test_one_thread_chooses_keypoints(tmp_path, monkeypatch):
 def test_joints_are_measured_as_well_before_a_film_ends(smooth, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     simulate(SCENARIO, ".")
-    seen = (*JOINTS, "l_shoulder", "r_shoulder")
+    names = (*JOINTS, "l_shoulder", "r_shoulder")
     truth, half = read_truth("truth.csv"), FRAMES // 2
     with VideoWriter("short.mp4", FPS) as writer:
         for frame in Video("video_2.mp4").frames(0, half):
@@ -273,10 +273,10 @@ def test_joints_are_measured_as_well_before_a_film_ends(smooth, tmp_path, monkey
 
     def detected(options, video, frames):
         camera, random = read_camera(options.camera), np.random.default_rng(1)
-        uv = np.stack([camera.project(truth.places[name][list(frames)]) for name in seen], axis=1)
+        uv = np.stack([camera.project(truth.places[name][list(frames)]) for name in names], axis=1)
         uv = uv + 0.3 * random.standard_normal(uv.shape)
         ones = np.ones(uv.shape[:2])
-        return {0: Keypoints(np.array(frames), np.array(frames) / FPS, seen, uv, ones)}, 0
+        return {0: Keypoints(np.array(frames), np.array(frames) / FPS, names, uv, ones)}, 0
 
     monkeypatch.setattr(scene, "_detect", detected)
     monkeypatch.setattr(scene, "_require_detector", lambda options: None)
@@ -287,7 +287,7 @@ def test_joints_are_measured_as_well_before_a_film_ends(smooth, tmp_path, monkey
         words += ["--offsets", "0", "--init", "init.json", "--particles", "300", "-o", "t.csv"]
         assert main(words) == 0
         track = read_estimates("t.csv")
-        off = [track.places[name] - truth.places[name][track.frame] for name in seen]
+        off = [track.places[name] - truth.places[name][track.frame] for name in names]
         errors[film] = np.linalg.norm(off, axis=2).mean(axis=0)
     last = slice(half - 3, half)  # whose surroundings have frames of one camera
     assert errors["short.mp4"][last].mean() < 1.12 * errors["video_2.mp4"][last].mean()
