@@ -269,6 +269,7 @@ def test_options_named_in_the_text_exist():
         "--keep",
         "--add",
         "--seconds",
+        "--real-time",
     }  # of others
     unknown = []
     for page in PAGES:
