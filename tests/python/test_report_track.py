@@ -99,12 +99,13 @@ def test_left_is_blue_and_right_orange_as_in_pictures():
 
 def test_draws_are_used_where_given(folder, capsys):
     command = ["report", "track", str(folder / "walk.csv"), "-o", str(folder / "d"), "--json"]
-    assert main([*command, "--draws", str(folder / "draws.npz")]) == 0
-    printed = json.loads(capsys.readouterr().out)
+    sd = []
+    for draws in ([], ["--draws", str(folder / "draws.npz")]):
+        assert main([*command, *draws]) == 0
+        printed = json.loads(capsys.readouterr().out)
+        sd.append(np.median([e["sd_s"] for e in printed["events"] if e["event"].endswith("heel_strike")]))
     assert printed["uncertainty"].startswith("20 motions")
-    own = json.loads((folder / "walk_gait/parameters.json").read_text())
-    late = [e["sd_s"] for e in printed["events"]]
-    assert np.median(late) > 2 * np.median([e["sd_s"] for e in own["events"]])
+    assert sd[1] > 1.5 * sd[0]  # the draws are late by 20 ms, a person's own strikes by 7
 
 
 def test_draws_of_another_track_are_refused(folder, capsys):
