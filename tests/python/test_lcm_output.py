@@ -145,7 +145,7 @@ def test_a_log_with_nothing_in_it_is_reported(tmp_path, content, words):
 
 def test_a_log_of_which_no_frame_fits_the_camera_is_reported(tmp_path):
     camera = tmp_path / "camera.json"
-    camera.write_text(json.dumps(replace(rig.CAMERA, width=320, height=240).to_dict()))
+    camera.write_text(json.dumps(replace(rig.CAMERA, width=320, height=240, cx=159.5, cy=119.5).to_dict()))
     events = [("GAIT_COMMAND", rig.start(0)), *rig.frames(0, 3)]
     source = rig.write_log(tmp_path / "in.log", events)
     done = run(source, f"file://{tmp_path}/out.log?mode=w", "--camera", camera)

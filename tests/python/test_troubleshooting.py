@@ -19,7 +19,7 @@ def templates():
                 found.add("".join(parts))
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 found.add(node.value)
-    for path in (ROOT / "libgait/src").rglob("*.c"):
+    for path in [*(ROOT / "libgait/src").rglob("*.c"), *(ROOT / "tools").rglob("*.c")]:
         joined = re.sub(r'"\s*\n\s*"', "", path.read_text(encoding="utf-8"))
         found.update(re.findall(r'"((?:[^"\\\n]|\\.)*)"', joined))
     return found
