@@ -26,6 +26,7 @@ static gait_result layer_estimate(gait_lift *lift, gait_lift_frame *frame, gait_
 #include "check.h"
 #include "toy_model.h"
 #include "toy_segment.h"
+#include "toy_written.h"
 
 enum { FRAME = 40000 };
 
@@ -36,14 +37,6 @@ static char segments[] = P_tmpdir "/gait_lift_XXXXXX";
 static lift_service l;
 static sink out;
 static message why;
-
-static void write_file(char *name, const void *data, size_t bytes)
-{
-    int const file = mkstemp(name);
-    if (file < 0 || write(file, data, bytes) != (ssize_t)bytes)
-        abort();
-    close(file);
-}
 
 /* Keypoints of a frame: those of the model, or this one alone. */
 static bool keypoints(int64_t utime, const char *name, float u)
@@ -71,7 +64,7 @@ static void test_open(void)
     size_t bytes;
     const void *const model = toy_model_blob(&bytes);
     lift_settings const usual = {.sd = 0, .lag = -1, .cpu_mask = ~0u};
-    write_file(toy, model, bytes);
+    toy_written(toy, model, bytes);
     l = (lift_service){0};
     CHECK(!lift_service_open(&l, "/absent/model", &SET, &out, &why) && strstr(why.text, "cannot open"));
     lift_service_close(&l);
@@ -146,7 +139,7 @@ int main(void)
     static uint8_t blob[TOY_BYTES];
     static toy_segments made;
     toy_segments_fill(&made, 1, 0);
-    write_file(segments, blob, toy_segments_write(blob, &made));
+    toy_written(segments, blob, toy_segments_write(blob, &made));
     test_open();
     l.lift = NULL;
     CHECK(keypoints(1, "nose", 24) && l.frames == 0); /* no camera yet */

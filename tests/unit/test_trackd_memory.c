@@ -62,19 +62,12 @@ static gait_result layer_pool_init(void *memory, size_t bytes, int32_t threads, 
 #include "check.h"
 #include "toy_model.h"
 #include "toy_segment.h"
+#include "toy_written.h"
 
 static const gait_camera CAMERA = {48, 32, 50, 50, 24, 16, {1, 0, 0, 0, 0, -1, 0, 1, 0}, {0, 1, 5}, {0}};
 
 static char model[] = P_tmpdir "/gait_memory_XXXXXX", segments[] = P_tmpdir "/gait_memory_XXXXXX";
 static message why;
-
-static void write_file(char *name, const void *data, size_t bytes)
-{
-    int const file = mkstemp(name);
-    if (file < 0 || write(file, data, bytes) != (ssize_t)bytes)
-        abort();
-    close(file);
-}
 
 static struct parts {
     service s, second;
@@ -172,9 +165,9 @@ int main(void)
     static toy_segments made;
     size_t bytes;
     const void *const toy = toy_model_blob(&bytes);
-    write_file(model, toy, bytes);
+    toy_written(model, toy, bytes);
     toy_segments_fill(&made, 1, 0);
-    write_file(segments, blob, toy_segments_write(blob, &made));
+    toy_written(segments, blob, toy_segments_write(blob, &made));
     test_every_allocation();
     test_files();
     test_threads();

@@ -83,6 +83,7 @@ static int layer_poll(struct pollfd *fd, nfds_t count, const struct timespec *wa
 
 #include "check.h"
 #include "toy_model.h"
+#include "toy_written.h"
 
 static char model[] = P_tmpdir "/gait_receiver_XXXXXX";
 static service s, second;
@@ -231,12 +232,9 @@ static void test_channels(void)
 
 int main(void)
 {
-    int const file = mkstemp(model);
     size_t bytes;
     const void *const toy = toy_model_blob(&bytes);
-    if (file < 0 || write(file, toy, bytes) != (ssize_t)bytes)
-        abort();
-    close(file);
+    toy_written(model, toy, bytes);
     start();
     test_open();
     test_run();

@@ -9,6 +9,7 @@
 
 #include "check.h"
 #include "toy_model.h"
+#include "toy_written.h"
 
 enum { WIDTH = 48, HEIGHT = 32, FRAME = 33333 };
 
@@ -388,12 +389,9 @@ static void test_nearest(void)
 
 int main(void)
 {
-    int const file = mkstemp(model);
     size_t bytes;
     const void *const toy = toy_model_blob(&bytes);
-    if (file < 0 || write(file, toy, bytes) != (ssize_t)bytes)
-        abort();
-    close(file);
+    toy_written(model, toy, bytes);
     for (int i = 0; i < (int)sizeof pixels; i++) {
         pixels[i] = (uint8_t)(i * 37 % 200);
         other[i] = (uint8_t)(255 - i * 91 % 200);
