@@ -24,6 +24,7 @@ static const float OPEN_SD = 0.9f;      /* radians of standard deviation from wh
 static const float BUILD_SHARE = 0.25f; /* of the sd of scores and posture while the phase is unknown */
 static const float SPEEDS_UP = 0.4f;    /* sd of a rate below the usual one, as a share of the difference */
 static const float LEAST_PLACE_SD = 0.05f; /* metres */
+static const float MOST_PLACE_SD = 10.0f;  /* metres; gait_tracker_start() takes no more */
 
 /* Steps of the finite differences that replace derivatives. */
 static const double STEP[N] = {0.02, 0.02, 0.03, 0.03, 0.01, 0.01, 0.01, 0.01, 0.1, 0.1, 0.1};
@@ -334,12 +335,12 @@ static float root(double variance)
 static void widen(const gait_start *s, gait_hypothesis *h)
 {
     h->sd.phase = f_max(h->sd.phase, 0.03f);
-    h->sd.heading = f_max(h->sd.heading, 0.08f);
+    h->sd.heading = f_clamp(h->sd.heading, 0.08f, PI_F);
     h->sd.stature = f_max(h->sd.stature, 0.03f);
     h->sd.stride_hz =
         f_max(h->sd.stride_hz, f_max(0.03f, SPEEDS_UP * (s->model->stride_hz - h->mean.stride_hz)));
     for (int32_t k = 0; k < 3; k++)
-        h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], LEAST_PLACE_SD, 10.0f);
+        h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], LEAST_PLACE_SD, MOST_PLACE_SD);
 }
 
 /* Widen the standard deviations of what boxes do not determine; returns what this adds to the covariance of x and y. */
@@ -354,7 +355,8 @@ static double leave_open(const gait_start *s, const start_candidate *c, gait_hyp
         BOX_PLACE * BOX_PLACE / (double)(ray[0] * ray[0] + ray[1] * ray[1]); /* the viewing ray */
     for (int32_t k = 0; k < 2; k++) {
         double const own = (double)h->sd.pelvis[k];
-        h->sd.pelvis[k] = f_max(root(own * own + along * (double)(ray[k] * ray[k])), LEAST_PLACE_SD);
+        h->sd.pelvis[k] =
+            f_clamp(root(own * own + along * (double)(ray[k] * ray[k])), LEAST_PLACE_SD, MOST_PLACE_SD);
     }
     if (c->in_place) {
         h->mean.stride_hz = s->model->stride_hz;
