@@ -334,7 +334,7 @@ static float root(double variance)
  * a person who has just begun to walk will soon be faster. */
 static void widen(const gait_start *s, gait_hypothesis *h)
 {
-    h->sd.phase = f_max(h->sd.phase, 0.03f);
+    h->sd.phase = f_clamp(h->sd.phase, 0.03f, 0.5f);
     h->sd.heading = f_clamp(h->sd.heading, 0.08f, PI_F);
     h->sd.stature = f_max(h->sd.stature, 0.03f);
     h->sd.stride_hz =
