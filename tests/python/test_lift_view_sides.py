@@ -13,7 +13,7 @@ from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.lift import run
 from gait.lift.keypoints.joined import joined
-from gait.lift.run import Lifted, Request
+from gait.lift.run import FilmedView, Lifted, Request
 from gait.lift.segment.view import Several
 from gait.lift.smooth.options import Options
 from gait.lift.view_sides import best_sides
@@ -120,7 +120,7 @@ def test_offsets_come_from_repaired_sides_and_a_swapped_frame_is_no_spike(views,
     found_of = run.find_offset
     monkeypatch.setattr(run, "find_offset", lambda *given: observed.append(given[2]) or found_of(*given))
     monkeypatch.setattr(run, "best_sides", as_joined)
-    films = [("a.csv", views[0], files[0]), ("b.csv", spoilt, files[1])]
+    films = [FilmedView("a.csv", files[0], views[0]), FilmedView("b.csv", files[1], spoilt)]
     lifted = run.lift_views(films, None, SegmentPrior.load(), Request(Options()), lambda _: None, True)
     alone, together = observed
     np.testing.assert_array_equal(alone.uv[15:24], late.uv[15:24])

@@ -10,8 +10,11 @@ import walking_keypoints as walking
 from gait.bindings.segment_prior import SegmentPrior
 from gait.camera.camera import Camera, write_camera
 from gait.cli import main
+from gait.errors import UserError
 from gait.io.keypoints_file import read, write
+from gait.io.layouts import joint_named, points_of
 from gait.io.track_file import read_estimates
+from gait.lift import run
 from gait.lift.keypoints.observations import Grid
 from gait.lift.segment.view import Perspective, Several
 from gait.lift.smooth import motion
@@ -117,3 +120,53 @@ def test_what_does_not_go_with_several_views_is_a_usage_error(place, options, wo
     assert main(["lift", "a.csv", "b.csv", *cameras, *options, "-o", "x.csv"]) == 2
     err = capsys.readouterr().err
     assert words in err and err.count("\n") == 1 and not (place / "x.csv").exists()
+
+
+@pytest.fixture
+def joined_of(monkeypatch):
+    """Function that lifts views up to joining them, and returns the keypoints and offsets to be joined."""
+
+    def call(*words):
+        found = []
+
+        def note(*given):
+            found.extend(given)
+            raise UserError("enough")
+
+        monkeypatch.setattr(run, "joined", note)
+        assert main(["lift", *map(str, words), "--keep-sides", "--quiet", "-o", "x.csv"]) == 1
+        return found
+
+    return call
+
+
+def mediapipe(path, keypoints, size):
+    """Write keypoints as MediaPipe does, as fractions of the picture."""
+    joints = [joint_named(name) for name in points_of(33)]
+    frames = []
+    for time, uv in zip(keypoints.time.tolist(), keypoints.uv, strict=True):
+        shares = (uv + 0.5) / size
+        points = [{"x": 0.0, "y": 0.0, "z": 0.0, "visibility": 0.0} for _ in joints]
+        for point, joint in zip(points, joints, strict=True):
+            if joint in keypoints.names:
+                x, y = shares[keypoints.names.index(joint)].tolist()
+                point |= {"x": x, "y": y, "visibility": 1.0}
+        frames.append({"timestamp_ms": 1000 * time, "landmarks": points})
+    path.write_text(json.dumps({"frames": frames}))
+
+
+def test_fractions_are_of_the_picture_of_the_views_own_camera(tmp_path, monkeypatch, joined_of):
+    monkeypatch.chdir(tmp_path)
+    cameras = {"a": walking.view(), "b": SIDE.scaled(0.5)}
+    assert cameras["a"].size != cameras["b"].size
+    words = []
+    for name, camera in cameras.items():
+        mediapipe(tmp_path / f"{name}.json", walking.keypoints(camera, noise=0.0), camera.size)
+        write_camera(tmp_path / f"{name}_camera.json", camera)
+        words += ["--camera", f"{name}_camera.json"]
+    views, _ = joined_of("a.json", "b.json", *words, "--offsets", "0")
+    for view, camera in zip(views, cameras.values(), strict=True):
+        right = walking.keypoints(camera, noise=0.0)
+        columns = [right.names.index(name) for name in view.names]
+        assert len(columns) > 10
+        np.testing.assert_allclose(view.uv, right.uv[:, columns], atol=1e-6)

@@ -334,15 +334,16 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         keep_sides=args.keep_sides,
         keep_spikes=args.keep_spikes,
         all_markers=args.all_markers,
-        clip=_clip(args),
+        clip=_clip(args, args.camera),
         stabilised=args.stabilize == "auto",
         corrections=args.corrections,
     )
     if args.further:
-        views = [(args.input, in_video.keypoints if in_video else None, args.camera)]
+        own = in_video.keypoints if in_video else None
+        views = [lift_run.FilmedView(args.input, args.camera, own, request.clip)]
         for path, camera in args.further:
-            further = _detect(args, prior, path, camera) if _is_video(path, False) else None
-            views.append((path, further.keypoints if further else None, camera))
+            own = _detect(args, prior, path, camera).keypoints if _is_video(path, False) else None
+            views.append(lift_run.FilmedView(path, camera, own, _clip(args, camera)))
         lifted = lift_run.lift_views(views, args.offsets, prior, request, warn, args.quiet)
     elif in_video is None:
         lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
@@ -407,8 +408,8 @@ def _request(args: argparse.Namespace, video: str, camera: str | None) -> Reques
     )
 
 
-def _clip(args: argparse.Namespace) -> Clip:
-    """Collect what a file of another tool may lack: person, times, and the size of the picture."""
+def _clip(args: argparse.Namespace, camera: str | None) -> Clip:
+    """Collect what a view's file of another tool may lack: person, times, and the size of the picture."""
     from gait.camera.camera import Camera
     from gait.io.detections import Clip
 
@@ -418,8 +419,8 @@ def _clip(args: argparse.Namespace) -> Clip:
 
         film = Video(args.video)
         size, times = film.size, film.times
-    elif args.camera:
-        size = Camera.read(args.camera).size
+    elif camera:
+        size = Camera.read(camera).size
     return Clip(args.person, args.fps, times, size, args.quiet)
 
 

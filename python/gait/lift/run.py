@@ -98,6 +98,28 @@ class Request:
 
 
 @dataclass(frozen=True)
+class FilmedView:
+    """One of several views of a person.
+
+    Attributes
+    ----------
+    path : str
+        Film, or file of keypoints.
+    camera : str
+        Camera file.
+    keypoints : Keypoints, optional
+        Those found in the film; None to read them from `path`.
+    clip : Clip
+        What a keypoint file of another tool may lack, as in `Request`.
+    """
+
+    path: str
+    camera: str
+    keypoints: Keypoints | None = None
+    clip: Clip = Clip()
+
+
+@dataclass(frozen=True)
 class Prepared:
     """Keypoints ready for lifting, before any correction by hand; see `Lifted`."""
 
@@ -184,7 +206,7 @@ def lift_keypoints(
 
 
 def lift_views(
-    views: Sequence[tuple[str, Keypoints | None, str]],
+    views: Sequence[FilmedView],
     offsets: Sequence[float] | None,
     prior: SegmentPrior,
     request: Request,
@@ -195,8 +217,7 @@ def lift_views(
 
     Parameters
     ----------
-    views : sequence of (str, Keypoints or None, str)
-        File; its keypoints, or None to read them from it; camera file.
+    views : sequence of FilmedView
     offsets : sequence of float, optional
         Start of each film but the first, seconds after the first; by default estimated from the motion.
 
@@ -209,14 +230,15 @@ def lift_views(
     sided: list[Keypoints] = []  # with left and right as each view alone shows them, to find offsets
     cameras: list[Camera] = []
     began: list[float] = []
-    for number, (path, keypoints, camera) in enumerate(views):
+    for number, view in enumerate(views):
+        path, keypoints = view.path, view.keypoints
 
         def named(words: str, path: str = path) -> None:
             warn(f"{path}: {words}")
 
         if keypoints is None:
-            keypoints, _ = keypoints_file.read(path, prior.names, request.ignore_unknown, request.clip)
-        own = replace(request, camera=camera)
+            keypoints, _ = keypoints_file.read(path, prior.names, request.ignore_unknown, view.clip)
+        own = replace(request, camera=view.camera, clip=view.clip)
         one = prepare(path, keypoints, prior, own, named, quiet, sides_later=not request.keep_sides)
         assert isinstance(one.view, Perspective)
         sided.append(one.keypoints)
@@ -228,7 +250,7 @@ def lift_views(
             found = find_offset(sided[0], cameras[0], sided[-1], one.view.camera, given)
             if given is None and (found is None or not found.certain):
                 raise UserError(
-                    f"{path}: the person's motion does not show its time offset from {views[0][0]}; "
+                    f"{path}: the person's motion does not show its time offset from {views[0].path}; "
                     "check the cameras, and give --offsets: how many seconds later each further film began"
                 )
             began.append(found.seconds if given is None and found is not None else given or 0.0)
@@ -243,12 +265,15 @@ def lift_views(
     whole = Prepared(together, several, options, repairs)
 
     def lift(keypoints: Keypoints) -> Lifted:
-        return lift_prepared(views[0][0], replace(whole, keypoints=keypoints), Edits(), prior, request, quiet)
+        return lift_prepared(
+            views[0].path, replace(whole, keypoints=keypoints), Edits(), prior, request, quiet
+        )
 
     lifted = (
         lift(together) if request.keep_sides else best_sides(prior, together, several, options, lift, quiet)
     )
-    for number, ((path, _, _), one) in enumerate(zip(views, prepared, strict=True)):
+    for number, (view, one) in enumerate(zip(views, prepared, strict=True)):
+        path = view.path
         repairs["spikes"] += one.repairs["spikes"]
         repairs["left_out"] += [{"film": path, **point} for point in one.repairs["left_out"]]
         before, after = (each.among(camera_of == number) for each in (together, lifted.keypoints))
