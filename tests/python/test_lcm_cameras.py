@@ -1,6 +1,7 @@
 """gait-trackd --further-streams: frames of several cameras of one person, as far as they arrive."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 
@@ -10,11 +11,13 @@ import pytest
 
 from gait.bindings.config import TrackerConfig
 from gait.camera.camera import Camera
-from gait.lcm.link import private_url
+from gait.lcm.capture import Publisher, Setup
+from gait.lcm.link import gaitmsg, open_lcm, private_url
 from gait.lcm.messages import camera_message, image_message
 from gait.track.tracker import Tracker
 
 FRAMES, LATE = 24, 9_000  # microseconds by which the second camera's frames are later
+BOTH = 1 << 0 | 1 << 3  # backgrounds of both cameras, as in a status
 SIDE = Camera.looking((4.0, 0.5, 1.2), (0.0, 0.0, 0.9), (160, 120), 140.0)
 
 
@@ -83,6 +86,8 @@ def test_two_streams_are_one_tracker(missing, tmp_path):
     outcome = play(tmp_path, [*opening(), *both], "--further-streams", 3)
     assert used(outcome) == (FRAMES - len(missing), len(missing))
     assert outcome.frames == FRAMES and outcome.digest == by_python(set(range(FRAMES)) - set(missing))
+    status = rig.read_log(tmp_path / "a.out", "GAIT_STATUS", gaitmsg.status_t)[-1]
+    assert status.background_mask == BOTH
     if not missing:
         before = [event for i in range(FRAMES) for event in (second(i), *rig.frames(i, i + 1))]
         assert play(tmp_path, [*opening(), *before], "--further-streams", 3).digest == outcome.digest
@@ -98,6 +103,16 @@ def test_the_tracker_waits_for_all_cameras_and_reports_which(tmp_path):
     assert used(late) == (1, 3)
 
 
+def test_each_of_two_cameras_waits_until_its_own_background_is_known():
+    rig.need_multicast()
+    url = private_url()
+    cameras = {0: rig.CAMERA, 3: SIDE}
+    with rig.daemon(url, "--further-streams", 3), ThreadPoolExecutor() as both:
+        senders = [Publisher(open_lcm(url), Setup(i, cameras[i], plate=rig.plate())) for i in cameras]
+        waits = [both.submit(sender.meet, rig.PATIENCE) for sender in senders]
+        assert [wait.result() for wait in waits] == [None, None]
+
+
 def test_after_a_kill_two_streams_are_tracked_as_if_nothing_had_happened(tmp_path):
     rig.need_multicast()
     url, killed = private_url(), 8
@@ -110,13 +125,13 @@ def test_after_a_kill_two_streams_are_tracked_as_if_nothing_had_happened(tmp_pat
         return listener.estimates[-1]
 
     with rig.daemon(url, *words) as (listener, _):
-        listener.ask(opening()[:-1], lambda s: s.background_mask, "cameras and backgrounds")
+        listener.ask(opening()[:-1], lambda s: s.background_mask == BOTH, "cameras and backgrounds")
         listener.ask(opening()[-1:], lambda s: s.state == s.ARMED, "a start")
         feed(listener, 0, killed)
         rig.kill(listener)
     with rig.daemon(url, *words) as (listener, finish):
         backgrounds = [event for event in opening() if "BACKGROUND" in event[0]]
-        listener.ask(backgrounds, lambda s: s.background_mask, "backgrounds")
+        listener.ask(backgrounds, lambda s: s.background_mask == BOTH, "backgrounds")
         last = feed(listener, killed, FRAMES)
         assert f"following the person of frame {killed - 1}" in finish().words
     state = (tmp_path / "state").read_bytes()

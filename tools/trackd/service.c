@@ -292,11 +292,13 @@ void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, 
 void service_further_background(service *s, further_camera *c, const image_view *v)
 {
     message why;
+    bool const known = c->background.data;
     if (!further_take_background(c, v, &why)) {
         s->counts.rejected++;
         service_complain(s, "%s", why.text);
     } else if (s->track.tracker)
         set_further_backgrounds(s);
+    s->news = s->news || (!known && c->background.data);
 }
 
 bool service_pixels(service *s, const image_view *v, gait_image *out, message *why)
@@ -517,6 +519,15 @@ void service_status(service *s, int64_t utime)
         s->text = s->complaint;
 }
 
+/* Bit i: the empty scene of camera i is known. */
+static int32_t background_mask(const service *s)
+{
+    int32_t mask = s->track.background.data ? 1 << s->stream : 0;
+    for (int i = 0; s->further && i < s->further->count; i++)
+        mask |= s->further->camera[i].background.data ? 1 << s->further->camera[i].stream : 0;
+    return mask;
+}
+
 void service_send_status(service *s)
 {
     char version[32];
@@ -531,7 +542,7 @@ void service_send_status(service *s)
         .model_digest = (int64_t)s->track.info.digest,
         .tracker_digest = (int64_t)service_digest(s),
         .state = s->state,
-        .background_mask = s->track.background.data ? 1 << s->stream : 0,
+        .background_mask = background_mask(s),
         .command_id = s->command_id,
         .frames = s->counts.frames,
         .dropped = s->counts.dropped,
