@@ -139,6 +139,20 @@ def followed(listener, first, stop):
     return listener.estimates[-1], listener.second[-1]
 
 
+def test_capture_waits_for_trackers_of_several_people_and_starts_one_of_them(tmp_path):
+    rig.need_multicast()
+    url, clip = private_url(), rig.write_clip(tmp_path, 12)
+    scene = ["--camera", clip / "camera.json", "--background", clip / "background.png", "--url", url]
+    words = ["capture", clip / "video.mp4", *scene, "--init", clip / "init.json", "--quiet"]
+    with rig.daemon(url, "--keypoints-term", "--people", 2) as (listener, _):
+        done = rig.gait(*words, "--wait", 3)
+        assert done.returncode == 1 and "one of several people answers on GAIT_STATUS_" in done.stderr
+        done = rig.gait(*words, "--wait", rig.PATIENCE, "--person", 2)
+        assert done.returncode == 0, done.stderr
+        listener.until(lambda: bool(listener.second), "an estimate of person 2")
+        assert not listener.estimates
+
+
 def test_after_a_kill_everyone_is_followed_by_number_as_if_nothing_had_happened(tmp_path):
     """They meet in frame 21."""
     rig.need_multicast()

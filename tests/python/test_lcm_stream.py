@@ -185,6 +185,19 @@ def test_faults_of_capture_are_one_line(folder, options, code, words):
     assert done.returncode == code and words in done.stderr and done.stderr.count("\n") == 1, done.stderr
 
 
+def test_a_person_without_a_start_or_an_answer_is_refused(folder):
+    done = rig.gait("capture", folder / "video.mp4", "--person", 1)
+    assert done.returncode == 2 and "--person: is for --init and --wait" in done.stderr
+
+
+def test_the_start_of_a_person_in_a_log_is_on_that_persons_channel(folder, tmp_path):
+    log = tmp_path / "a.log"
+    words = [*capture_options(folder), "--person", 2, "--url", f"file://{log}?mode=w"]
+    assert rig.gait("capture", *words, "--rate", "max").returncode == 0
+    assert len(rig.read_log(log, "GAIT_COMMAND_2", gaitmsg.command_t)) == 1
+    assert not rig.read_log(log, "GAIT_COMMAND", gaitmsg.command_t)
+
+
 def test_a_start_outside_of_the_picture_is_reported(folder, tmp_path):
     init = json.loads((folder / "init.json").read_text())
     (tmp_path / "far.json").write_text(json.dumps(init | {"pelvis": [100, 100, 1]}))

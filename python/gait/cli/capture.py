@@ -5,7 +5,8 @@ receivers can count missed frames.  Calibration and empty scene are announced at
 seconds.  With --init the tracker gets a START for the right frame.
 
 --wait makes sure that a tracker is listening: the stream begins when gait-trackd has confirmed the camera,
-the empty scene and START.  Without it the stream begins at once.
+the empty scene and START.  Without it the stream begins at once.  With trackers of several people, --person N
+sends START to that of person N.
 
 --url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd replays without loss.
 
@@ -80,6 +81,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="wait at most S seconds for a tracker (default: 0)",
     )
+    add(
+        "--person",
+        type=values.whole(1, 8),
+        metavar="N",
+        help="with gait-trackd --people or --person: the person that --init describes, whose tracker answers",
+    )
     values.add_url(parser)
 
 
@@ -108,6 +115,8 @@ def _require_sense(args: argparse.Namespace, url: str) -> None:
         values.require_order(args.start, args.stop)
     if args.height is not None and not args.init:
         raise UsageError("--height: is for --init; give an init file, or auto")
+    if args.person is not None and not (args.init or args.wait > 0):
+        raise UsageError("--person: is for --init and --wait; frames are everyone's")
     if not is_log(url):
         return
     if args.wait > 0:
@@ -172,7 +181,7 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
     from gait.io.video import background, read_plate
     from gait.lcm.capture import DeviceSource, FileSource, Setup
 
-    setup = Setup(stream=args.stream, jpeg=args.jpeg)
+    setup = Setup(stream=args.stream, jpeg=args.jpeg, person=args.person)
     if args.camera and not args.camera_path:
         setup.camera = Camera.read(args.camera, source.size, args.scale_camera)
     if args.camera_path:

@@ -20,6 +20,7 @@ from gait.errors import UsageError, UserError
 from gait.io.video import Frame, Image, Video
 from gait.lcm.link import LogWriter, gaitmsg, handle, now
 from gait.lcm.messages import camera_message, command_message, decode, image_message
+from gait.lcm.record import channel_of
 
 if TYPE_CHECKING:
     import lcm
@@ -209,6 +210,9 @@ class Setup:
         Video time of `start`, seconds.
     jpeg : int or None
         Quality of compressed frames.
+    person : int or None
+        Of several people, the number of the one in `start`, whose tracker has to answer; None: people are not
+        distinguished, and any tracker may confirm camera and empty scene.
     """
 
     stream: int = 0
@@ -218,6 +222,7 @@ class Setup:
     start: Start | None = None
     start_time: float = 0.0
     jpeg: int | None = None
+    person: int | None = None
 
 
 class Publisher:
@@ -238,10 +243,14 @@ class Publisher:
     def __init__(self, out: lcm.LCM | LogWriter, setup: Setup) -> None:
         self._setup, self._out = setup, out
         self._status: Any = None
+        self._answering = ""  # channel of the last status
         self._announced = 0.0
         self.sent = 0
         if not isinstance(self._out, LogWriter):
-            self._out.subscribe("GAIT_STATUS", self._on_status).set_queue_capacity(8)
+            answers = (
+                "GAIT_STATUS(_[1-8])?" if setup.person is None else channel_of(setup.person, "GAIT_STATUS")
+            )
+            self._out.subscribe(answers, self._on_status).set_queue_capacity(8)
 
     def meet(self, patience: float) -> None:
         """Announce camera and empty scene until a tracker confirms them.
@@ -272,9 +281,10 @@ class Publisher:
             asked = self._send_start(0 if source.live else pacer.utime(self._setup.start_time))
             if self._listen(0.8 * _LEAD, partial(_confirms, asked)):
                 return pacer
-        raise UserError(
-            f"no tracker confirmed START within {patience:g} s; is gait-trackd running on this URL?"
-        )
+        remedy = "is gait-trackd running on this URL?"
+        if self._setup.person is None and self._answering not in ("", "GAIT_STATUS"):
+            remedy = f"one of several people answers on {self._answering}: give --person"
+        raise UserError(f"no tracker confirmed START within {patience:g} s; {remedy}")
 
     def send(
         self,
@@ -324,7 +334,7 @@ class Publisher:
         start = self._setup.start
         assert start is not None
         command = command_message(gaitmsg.command_t.START, utime, start.mean, start.sd)
-        self._out.publish("GAIT_COMMAND", command.encode())
+        self._out.publish(channel_of(self._setup.person, "GAIT_COMMAND"), command.encode())
         return int(command.id)
 
     def _is_ready(self, status: Any) -> bool:
@@ -355,7 +365,7 @@ class Publisher:
         return False
 
     def _on_status(self, channel: str, data: bytes) -> None:
-        self._status = decode(gaitmsg.status_t, data, channel)
+        self._status, self._answering = decode(gaitmsg.status_t, data, channel), channel
 
 
 def _confirms(command_id: int, status: Any) -> bool:
