@@ -17,6 +17,7 @@ from gait.lift.run import FilmedView, Lifted, Request
 from gait.lift.segment.view import Several
 from gait.lift.smooth.options import Options
 from gait.lift.view_sides import best_sides
+from gait.track import synchronise
 
 CAMERAS = (walking.view(), Camera.looking((6.0, 5.0, 1.6), (0.3, 5.5, 0.9), walking.SIZE, 1000.0))
 LEGS = ("hip", "knee", "ankle", "heel", "toe")
@@ -117,8 +118,10 @@ def test_offsets_come_from_repaired_sides_and_a_swapped_frame_is_no_spike(views,
         observed.append(keypoints)
         return Lifted(keypoints, None, None, None)
 
-    found_of = run.find_offset
-    monkeypatch.setattr(run, "find_offset", lambda *given: observed.append(given[2]) or found_of(*given))
+    found_of = synchronise.find_offset
+    monkeypatch.setattr(
+        synchronise, "find_offset", lambda *given: observed.append(given[2]) or found_of(*given)
+    )
     monkeypatch.setattr(run, "best_sides", as_joined)
     films = [FilmedView("a.csv", files[0], views[0]), FilmedView("b.csv", files[1], spoilt)]
     lifted = run.lift_views(films, None, SegmentPrior.load(), Request(Options()), lambda _: None, True)

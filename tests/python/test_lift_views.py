@@ -134,7 +134,7 @@ def joined_of(monkeypatch):
             raise UserError("enough")
 
         monkeypatch.setattr(run, "joined", note)
-        assert main(["lift", *map(str, words), "--keep-sides", "--quiet", "-o", "x.csv"]) == 1
+        assert main(["lift", *map(str, words), "--keep-sides", "-o", "x.csv"]) == 1
         return found
 
     return call
@@ -170,3 +170,54 @@ def test_fractions_are_of_the_picture_of_the_views_own_camera(tmp_path, monkeypa
         columns = [right.names.index(name) for name in view.names]
         assert len(columns) > 10
         np.testing.assert_allclose(view.uv, right.uv[:, columns], atol=1e-6)
+
+
+VIEWS = ("--camera", "a.json", "--camera", "b.json")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("b.csv", *VIEWS, "--offsets", "100"),
+            "b.csv: no frame is at the time of one of a.csv: it begins 100.00 s after that, which takes "
+            "2.93 s; correct --offsets",
+        ),
+        (
+            ("b.csv", *VIEWS, "--offsets", "-100"),
+            "it begins 100.00 s before that, which takes 2.93 s; correct --offsets",
+        ),
+        (
+            ("a.csv", "--camera", "a.json", "--camera", "a.json", "--offsets", "0"),
+            "a.csv: its camera is at the same place as that of a.csv; give each film and camera once",
+        ),
+        (
+            ("b.csv", "b_late.csv", *VIEWS, "--camera", "b.json", "--offsets", "0,0.4"),
+            "b_late.csv: its camera is at the same place as that of b.csv; give each film and camera once",
+        ),
+        (
+            ("still.csv", *VIEWS),
+            "still.csv: its time offset from a.csv cannot be estimated from the person's motion; give "
+            "--offsets",
+        ),
+    ],
+)
+def test_a_view_that_adds_nothing_is_refused(place, words, message, monkeypatch, capsys):
+    monkeypatch.chdir(place)
+    write("still.csv", walking.keypoints(SIDE, standing=True))
+    assert main(["lift", "a.csv", *words, "--keep-sides", "-o", "x.csv"]) == 1
+    assert message in capsys.readouterr().err and not (place / "x.csv").exists()
+
+
+def test_whether_an_offset_was_estimated_or_given_is_reported(place, joined_of, monkeypatch, capsys):
+    monkeypatch.chdir(place)
+    _, (given,) = joined_of("b_late.csv", "a.csv", *VIEWS[2:], *VIEWS[:2], "--offsets", f"{-LATE}")
+    words = capsys.readouterr().err
+    assert given == -LATE
+    assert "a.csv: began 0.400 s before the first film, as given (joints fit to 0." in words
+    _, (found,) = joined_of("a.csv", "b_late.csv", *VIEWS)
+    words = capsys.readouterr().err
+    assert found == pytest.approx(LATE, abs=0.04)
+    assert (
+        f"b_late.csv: began {found:.3f} s after the first film, estimated from the person's motion" in words
+    )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.bindings.state import state_range
@@ -28,7 +29,7 @@ from gait.lift.view_sides import best_sides
 from gait.progress import progress
 from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
-from gait.track.synchronise import find_offset
+from gait.track.synchronise import Film, no_shared_frame, synchronise
 
 #: Recordings; with two of one person, 90 % intervals for other people contained as little as 70 %.
 FEW_RECORDINGS = 4
@@ -227,8 +228,7 @@ def lift_views(
         One line that names the file.
     """
     prepared: list[Prepared] = []
-    sided: list[Keypoints] = []  # with left and right as each view alone shows them, to find offsets
-    cameras: list[Camera] = []
+    films: list[Film[int]] = []
     began: list[float] = []
     for number, view in enumerate(views):
         path, keypoints = view.path, view.keypoints
@@ -241,27 +241,23 @@ def lift_views(
         own = replace(request, camera=view.camera, clip=view.clip)
         one = prepare(path, keypoints, prior, own, named, quiet, sides_later=not request.keep_sides)
         assert isinstance(one.view, Perspective)
-        sided.append(one.keypoints)
+        sided = one.keypoints  # with left and right as this view alone shows them
         if offsets is None and not request.keep_sides:
             with suppress(UserError):  # too little may be visible in one view
-                sided[-1] = prepare(path, keypoints, prior, own, lambda _: None, quiet).keypoints
-        if number:
+                sided = prepare(path, keypoints, prior, own, lambda _: None, quiet).keypoints
+        film = Film(path, one.view.camera, {0: sided}, 0)
+        if films:
             given = None if offsets is None else offsets[number - 1]
-            found = find_offset(sided[0], cameras[0], sided[-1], one.view.camera, given)
-            if given is None and (found is None or not found.certain):
-                raise UserError(
-                    f"{path}: the person's motion does not show its time offset from {views[0].path}; "
-                    "check the cameras, and give --offsets: how many seconds later each further film began"
-                )
-            began.append(found.seconds if given is None and found is not None else given or 0.0)
-            missed = "" if found is None else f", and rays miss each other by {found.mismatch:.1f} degrees"
-            named(f"began {began[-1]:.3f} s after the first{missed}")
+            _, offset, words = synchronise(films, film, given)
+            began.append(offset.seconds)
+            named(words)
         prepared.append(one)
-        cameras.append(one.view.camera)
+        films.append(film)
     together, camera_of = joined([one.keypoints for one in prepared], began)
+    _require_shared(views, together, camera_of, began)
     repairs: dict[str, Any] = {"swapped": 0, "swaps": [], "spikes": 0, "left_out": [], "offsets_s": began}
     options = replace(request.options, pixel_sd=max(one.options.pixel_sd for one in prepared))
-    several = Several(tuple(cameras), camera_of)
+    several = Several(tuple(film.camera for film in films), camera_of)
     whole = Prepared(together, several, options, repairs)
 
     def lift(keypoints: Keypoints) -> Lifted:
@@ -282,6 +278,15 @@ def lift_views(
             repairs["swaps"] += [{"film": path, **span} for span in _spans(swapped)]
             repairs["swapped"] += int((after.visible & (after.uv != before.uv).any(axis=2)).sum())
     return replace(lifted, repairs=repairs)
+
+
+def _require_shared(
+    views: Sequence[FilmedView], together: Keypoints, camera_of: NDArray[np.intp], began: Sequence[float]
+) -> None:
+    """Raise UserError if a view has no point at the time of a frame of the first."""
+    for number, view in enumerate(views[1:], 1):
+        if not together.among(camera_of == number).visible.any():
+            raise no_shared_frame(view.path, views[0].path, began[number - 1], float(together.time[-1]))
 
 
 def prepare(

@@ -13,11 +13,9 @@ from gait.io.video import Frame, Video
 from gait.progress import note
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene, require_scene, stays
-from gait.track.synchronise import Offset, find_offset
+from gait.track.synchronise import Film, no_shared_frame, synchronise
 
 Array = NDArray[np.float64]
-
-_SAME_PLACE_M = 0.01  # metres between two cameras; from nearer by, their rays give no distance
 
 
 class SeveralVideos(Video):
@@ -43,10 +41,7 @@ class SeveralVideos(Video):
         ]
         for other, offset, partners in zip(others, offsets, self._partners, strict=True):
             if not (partners >= 0).any():
-                raise UserError(
-                    f"{other.path}: no frame is at the time of one of {video.path}: it begins {offset:.2f} s "
-                    f"after that, which takes {video.times[-1]:.2f} s; correct --offsets"
-                )
+                raise no_shared_frame(str(other.path), str(video.path), offset, float(video.times[-1]))
 
     def frames(self, start: int = 0, stop: int | None = None, *, grey: bool = False) -> Iterator[Frame]:
         """Yield the frames `start` <= index < `stop` in order, as BGR or grey."""
@@ -115,61 +110,18 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
         if one.video.count < 2:
             raise UserError(f"{video}: has one frame; give a film of the walk")
         require_scene(options, one, 0)
-        _require_apart(scene, one)
         given = None if options.offsets is None else options.offsets[k]
-        person, offset = _offset(scene, one, given)
+        person, offset, words = synchronise([_film(each) for each in (scene, *scenes)], _film(one), given)
         one = replace(one, person=person)
         if options.background == "auto" and one.plate is not None and one.people and stays(one):
             one = one.without_plate()
-        began.append(_words(given, offset))
-        note(f"{video}: {began[-1]}", options.quiet)
+        began.append(words)
+        note(f"{video}: {words}", options.quiet)
         scenes.append(one)
         offsets.append(offset.seconds)
     several = SeveralVideos(scene.video, [one.video for one in scenes], offsets)
     return replace(scene, video=several, further=tuple(scenes), began=tuple(began))
 
 
-def _require_apart(scene: Scene, other: Scene) -> None:
-    """Raise UserError if two cameras are at the same place, as when a file is given twice."""
-    if np.linalg.norm(other.camera.centre - scene.camera.centre) < _SAME_PLACE_M:
-        raise UserError(
-            f"{other.video.path}: its camera is at the same place as that of {scene.video.path}; give each "
-            "film and camera once"
-        )
-
-
-def _offset(scene: Scene, other: Scene, given: float | None) -> tuple[int, Offset]:
-    """Find the same person in another film, and the film's time offset."""
-    first = scene.people.get(scene.person)
-    found: dict[int, Offset] = {}
-    for id, keypoints in other.people.items():
-        if first is None or len(keypoints.time) < 2:
-            continue
-        one = find_offset(first, scene.camera, keypoints, other.camera, given)
-        if one is not None:
-            found[id] = one
-    if found:
-        person = min(found, key=lambda id: found[id].mismatch)
-        if given is not None or found[person].certain:
-            return person, found[person]
-    if given is not None:
-        return other.person, Offset(given, np.nan, True)
-    raise UserError(
-        f"{other.video.path}: its time offset from {scene.video.path} cannot be estimated from the person's "
-        "motion; give --offsets, the seconds by which each further film began later, and check the cameras"
-    )
-
-
-def _words(given: float | None, offset: Offset) -> str:
-    if offset.seconds == 0:
-        when = "began together with the first film"
-    else:
-        when = (
-            f"began {abs(offset.seconds):.3f} s {'after' if offset.seconds > 0 else 'before'} the first film"
-        )
-    how = "as given" if given is not None else "estimated from the person's motion"
-    return (
-        when
-        + f", {how}"
-        + ("" if np.isnan(offset.mismatch) else f" (joints fit to {offset.mismatch:.1f} deg)")
-    )
+def _film(scene: Scene) -> Film[int]:
+    return Film(str(scene.video.path), scene.camera, scene.people, scene.person)

@@ -1,4 +1,4 @@
-"""Time offset between two films of a walk, from the joints detected in both.
+"""Time offset between two films of a walk, from the joints detected in both, or as given.
 
 The rays along which two cameras see a joint at the same time intersect: the second lies in the plane through
 both cameras and the first ray (the epipolar constraint).  If the films are shifted in time, joints that move
@@ -8,12 +8,15 @@ both the distances of rays from the planes and the changes of these distances fr
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 
 Array = NDArray[np.float64]
@@ -25,8 +28,32 @@ _LONGEST_GAP_S = 0.15  # seconds; joints are not interpolated across longer gaps
 _LEAST_SINE = 0.05  # of the angle between a ray and the direction to the other camera
 _OTHER_OFFSET_S = 0.2  # seconds; offsets further from the best count as others
 _CLEAR_RATIO = 1.25  # least ratio of any other offset's mismatch to the best one's
+_SAME_PLACE_M = 0.01  # metres between two cameras; from nearer by, their rays give no distance
 _FINE = 10  # steps per frame of the final search
 _TOGETHER = 1.1  # films began together if that has up to this times the best mismatch, a frame away
+
+
+Id = TypeVar("Id", int, str)
+
+
+@dataclass(frozen=True)
+class Film(Generic[Id]):
+    """A film, or a file of keypoints found in it.
+
+    Attributes
+    ----------
+    path : str
+    camera : Camera
+    people : mapping of id to Keypoints
+        The people seen in it.
+    person : id
+        The one who is tracked or lifted; of a further film, if the motion does not show who that is.
+    """
+
+    path: str
+    camera: Camera
+    people: Mapping[Id, Keypoints]
+    person: Id
 
 
 @dataclass(frozen=True)
@@ -46,6 +73,71 @@ class Offset:
     seconds: float
     mismatch: float
     certain: bool
+
+
+def synchronise(films: Sequence[Film[int]], other: Film[Id], given: float | None) -> tuple[Id, Offset, str]:
+    """Find the person of the first film in another film, and the film's offset, with words that describe it.
+
+    Parameters
+    ----------
+    films : sequence of Film
+        The first film, and others before this one.
+    given : float, optional
+        The offset, seconds, if it is known.
+
+    Raises
+    ------
+    UserError
+        If two cameras are at the same place, or the motion does not show an offset that is not given.
+    """
+    for film in films:
+        if np.linalg.norm(other.camera.centre - film.camera.centre) < _SAME_PLACE_M:
+            raise UserError(
+                f"{other.path}: its camera is at the same place as that of {film.path}; give each film and "
+                "camera once"
+            )
+    first = films[0]
+    person, offset = same_person(first, other, given)
+    if given is None and not offset.certain:
+        raise UserError(
+            f"{other.path}: its time offset from {first.path} cannot be estimated from the person's motion; "
+            "give --offsets, the seconds by which each further film began later, and check the cameras"
+        )
+    return person, offset, _words(offset, given is not None)
+
+
+def same_person(first: Film[int], other: Film[Id], given: float | None) -> tuple[Id, Offset]:
+    """Find the person of the first film in another film: the one whose rays fit best, and the offset."""
+    found: dict[Id, Offset] = {}
+    person = first.people.get(first.person)
+    for id, keypoints in other.people.items():
+        if person is None or len(keypoints.time) < 2:
+            continue
+        one = find_offset(person, first.camera, keypoints, other.camera, given)
+        if one is not None:
+            found[id] = one
+    if not found:
+        return other.person, Offset(given or 0.0, np.nan, False)
+    id = min(found, key=lambda id: found[id].mismatch)
+    return id, found[id]
+
+
+def _words(offset: Offset, given: bool) -> str:
+    when = "together with the first film"
+    if offset.seconds != 0:
+        when = f"{abs(offset.seconds):.3f} s {'after' if offset.seconds > 0 else 'before'} the first film"
+    how = "as given" if given else "estimated from the person's motion"
+    fit = "" if np.isnan(offset.mismatch) else f" (joints fit to {offset.mismatch:.1f} deg)"
+    return f"began {when}, {how}{fit}"
+
+
+def no_shared_frame(path: str, first: str, began: float, last: float) -> UserError:
+    """Describe a film without a frame while the first is shown, seconds; `last`: the end of the first."""
+    when = f"{abs(began):.2f} s {'before' if began < 0 else 'after'} that"
+    return UserError(
+        f"{path}: no frame is at the time of one of {first}: it begins {when}, which takes {last:.2f} s; "
+        "correct --offsets"
+    )
 
 
 def find_offset(
