@@ -94,7 +94,8 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
     """
     if not options.further:
         return scene
-    scenes, offsets, began = [], [], []
+    scenes: list[Scene] = []
+    offsets, began = [], []
     for k, (video, camera) in enumerate(options.further):
         own = replace(
             options,
