@@ -20,15 +20,16 @@ from gait.lcm.messages import camera_message, command_message, image_message
 from gait.track.keypoint_start import keypoint_noise
 
 UV = np.random.default_rng(1).uniform(100, 300, (len(LANDMARK_JOINTS), 2))
+CHANNELS = ["GAIT_TRACKS_3", *(f"GAIT_TRACKS_3_{n}" for n in range(1, 9))]
 CONFIDENCE = np.linspace(0.3, 1, len(LANDMARK_JOINTS))
 
 
 class FakePeople:
-    """In every frame brighter than 10 finds a passer-by and a person who was detected before."""
+    """In every frame brighter than 10 finds a passer-by and, in those darker than 200, one found before."""
 
     def __init__(self, network, most, live):
         assert live
-        self.one, self.times = Followed(1), []
+        self.one, self.times = Followed(1, count=1), []
 
     def step(self, frame):
         assert frame.image.ndim == 3
@@ -41,7 +42,8 @@ class FakePeople:
         self.one.keypoints.append(person)
         self.one.count += 1
         passer_by = Followed(2, [frame.number], [frame.time], [person._replace(uv=UV + 50)], count=1)
-        return [(passer_by, passer_by.keypoints[0]), (self.one, person)]
+        both = [(passer_by, passer_by.keypoints[0]), (self.one, person)]
+        return both if frame.image.mean() < 200 else both[:1]
 
 
 @pytest.fixture
@@ -81,13 +83,38 @@ def test_joints_carry_time_and_number_of_their_frame(rigged):
     send(5, 5_040_000, 41)
     send(90, 5_080_000, -1, jpeg=90)
     send(90, 5_120_000, 43, channels=1)
-    frames = (5_000_000, 40), (5_080_000, -1), (5_120_000, 43)
-    for channel in ("GAIT_TRACKS_3", "GAIT_TRACKS_3_1", "GAIT_TRACKS_3_2"):
+    frames = (5_000_000, 40), (5_040_000, 41), (5_080_000, -1), (5_120_000, 43)
+    for channel in CHANNELS:
         assert tuple((m.utime, m.frame) for to, m in sent if to == channel) == frames
-    first = {to: m.tracks[0].u for to, m in sent[-3:]}
+    first = {to: m.tracks[0].u for to, m in sent[-9:-6]}
     assert first["GAIT_TRACKS_3"] == first["GAIT_TRACKS_3_2"] == pytest.approx(first["GAIT_TRACKS_3_1"] - 50)
     assert (live.frames, live.found) == (4, 3)
     assert live._detector.times == pytest.approx([0, 0.04, 0.08, 0.12])
+
+
+def test_a_message_without_joints_means_that_the_person_is_not_in_view(rigged):
+    """On every channel, so that no frame waits for a person who is not there."""
+    _, _, send, sent = rigged
+    for n, level in enumerate((5, 90, 250)):
+        sent.clear()
+        send(level, 40_000 * n, n)
+        assert [channel for channel, _ in sent] == CHANNELS
+        present = [channel for channel, message in sent if message.ntracks]
+        assert present == [[], CHANNELS[:3], CHANNELS[1:2]][n]
+
+
+def test_one_person_is_sent_until_out_of_view_for_a_second(rigged):
+    """A crossing hides the person for a while; the other one's joints would take the tracker along."""
+    _, _, send, sent = rigged
+    who = []
+    for n in range(30):
+        sent.clear()
+        send(250 if 5 <= n < 10 or 12 <= n < 26 else 90, 100_000 * n, n)
+        u = {channel: message.tracks[0].u for channel, message in sent if message.ntracks}
+        one, other = u.get("GAIT_TRACKS_3_2"), u["GAIT_TRACKS_3_1"]
+        who.append({one: "one", other: "other", None: "none"}[u.get("GAIT_TRACKS_3")])
+    # Hidden from frame 12 on: frame 21 is a second after the last one that shows the person.
+    assert who == ["one"] * 5 + ["none"] * 5 + ["one"] * 2 + ["none"] * 9 + ["other"] * 9
 
 
 def test_joints_are_the_models_of_the_person_in_view_longest(rigged):

@@ -342,6 +342,12 @@ static void test_people(void)
     CHECK(second.track.tracker && third.track.tracker && third.person == 3 && second.next == &third);
     background(pixels, GAITMSG_IMAGE_T_PIXEL_FORMAT_GRAY, WIDTH);
     CHECK(third.track.background.data == s.track.background.data);
+    for (int i = 0; i < 3; i++) { /* a message without joints is enough */
+        keypoints_view nothing = {.utime = 1};
+        message why;
+        CHECK(service_waits(&s, 1) && keypoint_cue_take(&cue[i], &nothing, &why));
+    }
+    CHECK(!service_waits(&s, 1));
     start(&s, 0);
     start(&third, 0);
     frame(1000000, 0);

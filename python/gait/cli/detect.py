@@ -5,8 +5,9 @@ file.  Download the network's weights once: gait detect --fetch.
 
 --lcm detects joints in frames that arrive over LCM (GAIT_IMAGE_<i>), in as many as the machine can process,
 and sends them: those of person N on GAIT_TRACKS_<i>_<N> for gait-trackd --people, and those of the person
-in view longest on GAIT_TRACKS_<i> for gait-trackd --keypoints-term and --lift.  Numbers are 1 to --people; a
-person who is out of view for ten seconds may lose the number to another.  Ctrl-C ends it.
+in view longest, until out of view for a second, on GAIT_TRACKS_<i> for gait-trackd --keypoints-term and
+--lift.  Messages without joints are for people not in view.  Numbers are 1 to --people; a person who is out
+of view for ten seconds may lose the number to another.  Ctrl-C ends it.
 """
 
 from __future__ import annotations

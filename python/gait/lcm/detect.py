@@ -18,6 +18,7 @@ from gait.lcm.messages import decode, frame_number, picture, tracks_message
 _KEPT_FRAMES = 1  # frames that wait while the detector is busy; older ones are dropped
 
 
+_AWAY = 1.0  # seconds out of view after which `GAIT_TRACKS_<i>` takes another person
 _KEEPS = 10.0  # seconds out of view after which a person's number may be reused
 
 
@@ -52,8 +53,10 @@ class Numbers:
 class LiveDetector:
     """Detects the joints of people in as many frames as the machine can process.
 
-    The joints of person N are sent on ``GAIT_TRACKS_<i>_<N>``.  Those of the person found in most frames so
-    far are also sent on ``GAIT_TRACKS_<i>``, or, if that person has gone, those of the next one.
+    The joints of person N are sent on ``GAIT_TRACKS_<i>_<N>``.  Those of one person are also sent on
+    ``GAIT_TRACKS_<i>``: always the same, until that person has been out of view for a second; then of the one
+    found in most frames so far.  Every frame that is processed has a message on each of these channels; one
+    without joints means that the person is not in view, so that a tracker need not wait.
 
     Parameters
     ----------
@@ -83,7 +86,8 @@ class LiveDetector:
         if is_log(url):
             raise UserError(f"--url {url}: --lcm needs a network, not a log; use gait detect VIDEO")
         self._network, self._detector = network, PeopleDetector(network, people, live=True)
-        self._numbers = Numbers(people)
+        self._people, self._numbers = people, Numbers(people)
+        self._main, self._main_last = 0, -np.inf  # id of the person on the channel without a number, seconds
         self._lcm = open_lcm(url)
         self._channel = f"GAIT_TRACKS_{stream}"
         self._lcm.subscribe(f"GAIT_IMAGE_{stream}", self._on_image).set_queue_capacity(_KEPT_FRAMES)
@@ -107,15 +111,25 @@ class LiveDetector:
         seconds = (message.utime - self._origin) / 1e6
         people = self._detector.step(Frame(self.frames, seconds, image))
         self.frames += 1
-        if people:
-            longest, _ = max(people, key=lambda pair: pair[0].count)
-            self.found += 1
-            for one, _ in people:
-                data = self._tracks(one, message).encode()
-                if one is longest:
-                    self._lcm.publish(self._channel, data)
-                if (number := self._numbers.number(one.id, seconds)) is not None:
-                    self._lcm.publish(f"{self._channel}_{number}", data)
+        self.found += bool(people)
+        found = {one.id: self._tracks(one, message) for one, _ in people}
+        main = self._main_of([one for one, _ in people], seconds)
+        sent = {self._channel: found.get(main)}
+        numbers = {self._numbers.number(id, seconds): tracks for id, tracks in found.items()}
+        sent |= {f"{self._channel}_{number}": numbers.get(number) for number in range(1, self._people + 1)}
+        nothing = tracks_message(
+            (), np.empty((0, 2)), message.utime, frame_number(message), errors=np.empty((0, 3))
+        )
+        for channel, tracks in sent.items():
+            self._lcm.publish(channel, (tracks or nothing).encode())
+
+    def _main_of(self, people: list[Followed], time: float) -> int:
+        """Return the id of the person on the channel without a number; 0: there has been no one yet."""
+        if any(one.id == self._main for one in people):
+            self._main_last = time
+        elif people and not 0 <= time - self._main_last < _AWAY:
+            self._main, self._main_last = max(people, key=lambda one: one.count).id, time
+        return self._main
 
     def _tracks(self, one: Followed, image: Any) -> Any:
         """Make the message with a person's joints in the newest frame, converted to the model's."""
