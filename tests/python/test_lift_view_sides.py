@@ -67,7 +67,7 @@ class Lift:
 
 def best(keypoints, of_point, lift):
     several = Several(CAMERAS, of_point)
-    return best_sides(SegmentPrior.load(), keypoints, several, Options(), lift, True)
+    return best_sides(SegmentPrior.load(), keypoints, several, Options(), [Options.pixel_sd] * 2, lift, True)
 
 
 def test_limbs_that_do_not_fit_the_motion_are_swapped(views):

@@ -221,3 +221,18 @@ def test_whether_an_offset_was_estimated_or_given_is_reported(place, joined_of, 
     assert (
         f"b_late.csv: began {found:.3f} s after the first film, estimated from the person's motion" in words
     )
+
+
+def test_each_view_keeps_its_own_noise(tmp_path, monkeypatch, joined_of):
+    monkeypatch.chdir(tmp_path)
+    words = []
+    for name, camera, noise in (("a", walking.view(), 1.0), ("b", SIDE, 12.0)):
+        found = walking.keypoints(camera, speed=0.6, noise=noise)  # at 15 frames per second
+        found = replace(found, time=found.time / 2, confidence=0.5 * found.confidence)
+        write(f"{name}.csv", found)
+        write_camera(tmp_path / f"{name}.json", camera)
+        words += ["--camera", f"{name}.json"]
+    (calm, noisy), _ = joined_of("a.csv", "b.csv", *words, "--offsets", "0")
+    least = Options.pixel_sd
+    np.testing.assert_array_equal(calm.changing(least), least / 0.5)
+    np.testing.assert_allclose(noisy.changing(least), 12.0, rtol=0.15)

@@ -140,7 +140,7 @@ class Lifted:
         Without spikes and swaps.
     view : View
     options : Options
-        With the standard deviation that was used.
+        With the standard deviation that was used; of several views, its median over the points.
     motion : Motion
     repairs : dict
         Repairs of the keypoints, as in the ``--json`` summary.
@@ -253,10 +253,12 @@ def lift_views(
             named(words)
         prepared.append(one)
         films.append(film)
-    together, camera_of = joined([one.keypoints for one in prepared], began)
+    noise = [one.options.pixel_sd for one in prepared]
+    options = replace(request.options, pixel_sd=min(noise))
+    own_errors = [_noisier(one.keypoints, sd, min(noise)) for one, sd in zip(prepared, noise, strict=True)]
+    together, camera_of = joined(own_errors, began)
     _require_shared(views, together, camera_of, began)
     repairs: dict[str, Any] = {"swapped": 0, "swaps": [], "spikes": 0, "left_out": [], "offsets_s": began}
-    options = replace(request.options, pixel_sd=max(one.options.pixel_sd for one in prepared))
     several = Several(tuple(film.camera for film in films), camera_of)
     whole = Prepared(together, several, options, repairs)
 
@@ -265,9 +267,10 @@ def lift_views(
             views[0].path, replace(whole, keypoints=keypoints), Edits(), prior, request, quiet
         )
 
-    lifted = (
-        lift(together) if request.keep_sides else best_sides(prior, together, several, options, lift, quiet)
-    )
+    if request.keep_sides:
+        lifted = lift(together)
+    else:
+        lifted = best_sides(prior, together, several, options, noise, lift, quiet)
     for number, (view, one) in enumerate(zip(views, prepared, strict=True)):
         path = view.path
         repairs["spikes"] += one.repairs["spikes"]
@@ -277,7 +280,18 @@ def lift_views(
             warn(f"{path}: {_named_swaps(swapped)}{' (--keep-sides)' * request.hints}")
             repairs["swaps"] += [{"film": path, **span} for span in _spans(swapped)]
             repairs["swapped"] += int((after.visible & (after.uv != before.uv).any(axis=2)).sum())
-    return replace(lifted, repairs=repairs)
+    usual = replace(options, pixel_sd=float(np.median(np.array(noise)[camera_of])))
+    return replace(lifted, options=usual, repairs=repairs)
+
+
+def _noisier(keypoints: Keypoints, sd: float, least: float) -> Keypoints:
+    """Add noise `sd` at full confidence to a view's own errors, apart from the `least` noise of all views."""
+    if sd == least:
+        return keypoints
+    more = np.sqrt(sd**2 - least**2) / np.maximum(keypoints.confidence, keypoints_file.LEAST_CONFIDENCE)
+    return replace(
+        keypoints, sd=more if keypoints.sd is None else np.hypot(np.nan_to_num(keypoints.sd), more)
+    )
 
 
 def _require_shared(

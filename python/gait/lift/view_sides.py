@@ -49,10 +49,13 @@ def best_sides(
     keypoints: Keypoints,
     several: Several,
     options: Options,
+    noise: Sequence[float],
     lift: Callable[[Keypoints], LiftedAs],
     quiet: bool,
 ) -> LiftedAs:
     """Lift the joined keypoints of several views by `lift`, with left and right as the motion shows them.
+
+    `noise`: standard deviation of each view's points at full confidence, pixels.
 
     UserError of `lift` only if it lifts from neither start.
     """
@@ -66,9 +69,8 @@ def best_sides(
             refused.append(error)
 
     attempt(keypoints)
-    views = range(len(several.cameras))
     suspected = [
-        swaps.share_suspected(keypoints.among(several.of_point == view), options.pixel_sd) for view in views
+        swaps.share_suspected(keypoints.among(several.of_point == view), sd) for view, sd in enumerate(noise)
     ]
     if found and found[0].motion.chi2_per_observation <= motion.POOR_FIT and not any(suspected):
         return found[0]
@@ -135,6 +137,7 @@ def _on_nearer_sides(
         Points expected in each view, with the names `known`, pixels.
     """
     uv, confidence = keypoints.uv.copy(), keypoints.confidence.copy()
+    sd = None if keypoints.sd is None else keypoints.sd.copy()
     for number, points in enumerate(expected):
         own = np.flatnonzero(several.of_point == number)
         tall = float(np.nanmedian(np.ptp(points[..., 1], axis=1)))
@@ -146,7 +149,12 @@ def _on_nearer_sides(
             there = points[:, [known.index(name) for name in names]]
             wrong = mistaken_sides(keypoints.uv[:, columns], there, names, tall)
             other = [columns[k] for k in other_sides(names)]
-            for values, before in ((uv, keypoints.uv), (confidence, keypoints.confidence)):
-                values[np.ix_(wrong, columns)] = before[np.ix_(wrong, other)]
+            for values, before in (
+                (uv, keypoints.uv),
+                (confidence, keypoints.confidence),
+                (sd, keypoints.sd),
+            ):
+                if values is not None and before is not None:
+                    values[np.ix_(wrong, columns)] = before[np.ix_(wrong, other)]
     changed = not np.array_equal(uv, keypoints.uv, equal_nan=True)
-    return replace(keypoints, uv=uv, confidence=confidence) if changed else None
+    return replace(keypoints, uv=uv, confidence=confidence, sd=sd) if changed else None
