@@ -11,7 +11,8 @@
 #include "gaitmsg_tracks_t.h"
 
 static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *path, sink *out,
-                  further *more, service *second, keypoint_cue *second_cue, uint8_t choice)
+                  further *more, pose_path *more_path, service *second, keypoint_cue *second_cue,
+                  uint8_t choice)
 {
     static memory_file model, segments;
     static uint8_t blob[TOY_BYTES];
@@ -40,8 +41,10 @@ static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *
         s->lift = lift;
     } else if (choice & 4)
         s->path = path;
-    if (choice & 16 && !s->path && further_open(more, "1", 0, &why))
+    if (choice & 16 && further_open(more, "1", 0, &why)) {
         s->further = more;
+        more->camera[0].path = s->path ? more_path : NULL;
+    }
     s->max_gap = 2;
     s->max_pixels = 2 * FUZZ_WIDTH * FUZZ_HEIGHT;
     ok = ok && service_open(s, out, 0, 1, NULL, choice & 8, &why);
@@ -62,6 +65,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static keypoint_cue cue, second_cue;
     static pose_path path;
     static further more;
+    static pose_path more_path;
     static const struct handler {
         lcm_msg_handler_t call;
         int64_t (*type)(void);
@@ -85,9 +89,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     s = second = (service){0};
     lift = (lift_service){0};
     cue = (keypoint_cue){0};
-    path = (pose_path){.turn_sd = 0.01f, .place_sd = 0.01f};
+    path = more_path = (pose_path){.turn_sd = 0.01f, .place_sd = 0.01f};
     more = (further){0};
-    start(&s, &lift, &cue, &path, &out, &more, &second, &second_cue, fuzz_take(&b));
+    start(&s, &lift, &cue, &path, &out, &more, &more_path, &second, &second_cue, fuzz_take(&b));
     receiver r = {.service = &s, .log = true, .snapshot = &snapshot};
     while (b.left > 0) { /* kind, length, and the message, without its type unless the type is damaged */
         uint8_t const kind = fuzz_take(&b);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -20,7 +21,8 @@ from gait.lcm.link import gaitmsg
 from gait.lcm.messages import camera_message, image_message
 from gait.track.tracker import Tracker
 
-FRAMES = 15
+FRAMES, LATE = 15, 9_000  # microseconds by which the second camera's frames are later
+LACKS = range(5, 10)  # frames whose poses the second camera does not send
 PRINTED = re.compile(r"poses_refused (\d+) frames_without_pose (\d+)")
 
 
@@ -120,6 +122,53 @@ def test_capture_announces_the_pose_of_each_frame(tmp_path):
     assert [one.utime for one in sent] == [one.utime for one in images]
     assert [one.t for one in sent] == [pytest.approx(pose.t.tolist()) for pose in poses]
     assert main([*map(str, words), "--loop"]) == 2
+
+
+def side_at(frame: float) -> rig.Camera:
+    """A second camera, beside the walk, that moves along with the person."""
+    side = rig.Camera.looking((4.0, 0.5, 1.2), (0.0, 0.0, 0.9), (160, 120), 140.0)
+    return replace(side, t=-side.R @ (side.centre + [frame / rig.FPS, 0, 0]))
+
+
+def side_events(frame: int, placed: bool = True) -> list[rig.Event]:
+    """Pose and frame of the second camera, 9 ms after those of the first."""
+    image, utime = side_picture(frame), rig.utime(frame) + LATE
+    sent = [("GAIT_CAMERA_3", camera_message(side_at(frame), utime))] * placed
+    return [*sent, ("GAIT_IMAGE_3", image_message(image, utime, frame))]
+
+
+@cache
+def side_picture(frame: int) -> np.ndarray:
+    ids = rig.model().render(side_at(frame), rig.person(frame))
+    colours = np.random.default_rng(2).integers(0, 255, (256, 3), np.uint8)
+    return np.where(ids[..., None] > 0, colours[ids], rig.plate())
+
+
+def digest_of_two(lacks: Sequence[int]) -> str:
+    """The library's with both cameras; where the second one lacks poses, three frames have the last one."""
+    config = TrackerConfig.default(particles=rig.PARTICLES, lag=5)
+    tracker = Tracker(rig.model(), [camera_at(0), side_at(0)], config)
+    tracker.start(rig.person(0), rig.SD, rig.utime(0))
+    for i in range(FRAMES):
+        beside = side_at(lacks[0] - 1 if i in lacks else i)
+        poses = [CameraPose(one.R, one.t) for one in (camera_at(i), beside)]
+        tracker.step([picture(i), side_picture(i) if i not in lacks[3:] else None], rig.utime(i), poses=poses)
+    return f"{tracker.digest():016x}"
+
+
+@pytest.mark.parametrize("lacks", [(), LACKS])
+def test_two_cameras_move_each_by_its_own_poses(lacks, tmp_path):
+    """Poses come after frames.  Without new ones the last is valid for 0.1 s; then frames are left out."""
+    events = []
+    for i in range(FRAMES):
+        events += [image(i), pose(i), *reversed(side_events(i, i not in lacks))]
+    first = side_events(0)[:1]
+    outcome, counts = play(tmp_path, [*first, *events], "--further-streams", 3)
+    left_out = len(lacks[3:])
+    found = re.search(r"3_used (\d+) .*3_missing (\d+) .*3_frames_without_pose (\d+)", outcome.printed)
+    assert [int(x) for x in found.groups()] == [FRAMES - left_out, left_out, left_out]
+    assert outcome.frames == FRAMES and counts == (0, 0) and outcome.digest == digest_of_two(lacks)
+    assert ("no camera pose for a frame" in outcome.words) == bool(lacks)
 
 
 @pytest.mark.parametrize(

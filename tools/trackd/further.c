@@ -115,33 +115,57 @@ static int64_t reach(const further *f, int64_t utime)
     return (interval < FURTHER_APART ? interval : FURTHER_APART) / 2;
 }
 
+/* Place of the frame nearest to a time, at most so many microseconds away; -1: none. */
+static int closest(const further_camera *c, int64_t utime, int64_t most)
+{
+    int best = -1;
+    for (int k = 0; k < FURTHER_PAST; k++)
+        if (c->utime[k] >= 0 && distance(c->utime[k], utime) <= most &&
+            (best < 0 || distance(c->utime[k], utime) < distance(c->utime[best], utime)))
+            best = k;
+    return best;
+}
+
+/* Whether the pose of that frame may still arrive. */
+static bool lacks_pose(const further_camera *c, int64_t utime, int64_t most)
+{
+    int const best = c->path ? closest(c, utime, most) : -1;
+    gait_camera_pose pose;
+    message why;
+    return best >= 0 && pose_path_at(c->path, c->utime[best], &pose, &why) == POSE_LATER;
+}
+
 bool further_waits(const further *f, int64_t utime)
 {
+    int64_t const most = reach(f, utime);
     for (int i = 0; i < f->count; i++) {
         const further_camera *const c = &f->camera[i];
         int64_t newest = -1;
         for (int k = 0; k < FURTHER_PAST && c->slot.known; k++)
             newest = c->utime[k] > newest ? c->utime[k] : newest;
-        if (c->slot.known && newest < utime - reach(f, utime) / 2)
+        if (c->slot.known && (newest < utime - most / 2 || lacks_pose(c, utime, most)))
             return true;
     }
     return false;
 }
 
-void further_images(further *f, int64_t utime, gait_frame *frame)
+bool further_images(further *f, int64_t utime, gait_frame *frame, message *why)
 {
     int64_t const most = reach(f, utime);
+    bool placed = true;
     f->before = utime;
     for (int i = 0; i < f->count; i++) {
         further_camera *const c = &f->camera[i];
-        int best = -1;
-        for (int k = 0; k < FURTHER_PAST; k++)
-            if (c->utime[k] >= 0 && distance(c->utime[k], utime) <= most &&
-                (best < 0 || distance(c->utime[k], utime) < distance(c->utime[best], utime)))
-                best = k;
-        c->used += best >= 0;
-        c->missing += best < 0;
-        if (best >= 0)
+        int const best = closest(c, utime, most);
+        bool const known = best < 0 || !c->path || pose_path_now(c->path, c->utime[best], &c->pose, why);
+        bool const used = best >= 0 && known;
+        placed = placed && known;
+        c->used += used;
+        c->missing += !used;
+        if (used) {
             frame->image[1 + i] = c->frame[best];
+            frame->pose[1 + i] = c->path ? &c->pose : NULL;
+        }
     }
+    return placed;
 }

@@ -4,6 +4,7 @@
 #define TRACKD_FURTHER_H
 #include "cameras.h"
 #include "image_view.h"
+#include "pose_path.h"
 
 enum {
     FURTHER_MOST = GAIT_MAX_CAMERAS - 1,
@@ -14,6 +15,8 @@ enum {
 typedef struct further_camera {
     int stream; /* its number */
     camera_slot slot;
+    pose_path *path;       /* poses of a camera that moves; NULL: it stands still */
+    gait_camera_pose pose; /* of the frame in use */
     uint8_t *pixels;       /* of the background, then of the frames */
     size_t bytes;          /* of pixels */
     gait_image background; /* data NULL: none */
@@ -42,9 +45,10 @@ bool further_allocate(further_camera *c, message *why);
 /* Copy a background or a frame, which must have the camera's size. */
 bool further_take_background(further_camera *c, const image_view *v, message *why);
 bool further_take_frame(further_camera *c, const image_view *v, message *why);
-/* Whether a frame of the first camera should wait, because another camera's frame of that time may still arrive. */
+/* Whether a frame of the first camera should wait, because another camera's frame of that time, or its pose, may still
+ * arrive. */
 bool further_waits(const further *f, int64_t utime);
-/* Images nearest in time to a frame of the first camera, at most half an interval between its frames away; a camera
- * without one has no image. */
-void further_images(further *f, int64_t utime, gait_frame *frame);
+/* Images nearest in time to a frame of the first camera, at most half an interval between its frames away, and the poses of
+ * cameras that move; a camera without one has no image.  false: there is an image whose pose is not known. */
+bool further_images(further *f, int64_t utime, gait_frame *frame, message *why);
 #endif

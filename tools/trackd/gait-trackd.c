@@ -66,6 +66,7 @@ typedef struct parts { /* optional parts of the service */
     keypoint_cue cue;
     pose_path path;
     further further;
+    pose_path further_path[FURTHER_MOST];
     service other[PEOPLE_MOST - 1]; /* people besides the first */
     keypoint_cue other_cue[PEOPLE_MOST - 1];
 } parts;
@@ -92,6 +93,18 @@ static void open_cue(service *s, const settings *want, keypoint_cue *cue)
 {
     keypoint_cue_open(cue, s->track.model, s->track.info.joints,
                       want->keypoints_sd > 0 ? want->keypoints_sd : 4);
+}
+
+/* All cameras move. */
+static void open_paths(service *s, const settings *want, parts *p)
+{
+    pose_path const none = {.turn_sd = want->pose_turn_sd / 57.29578f, .place_sd = want->pose_place_sd};
+    p->path = none;
+    s->path = &p->path;
+    for (int i = 0; i < p->further.count; i++) {
+        p->further_path[i] = none;
+        p->further.camera[i].path = &p->further_path[i];
+    }
 }
 
 /* The services of further people. */
@@ -123,12 +136,10 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
         open_cue(s, want, &p->cue);
         s->cue = &p->cue;
     }
-    if (want->moving_camera) {
-        p->path = (pose_path){.turn_sd = want->pose_turn_sd / 57.29578f, .place_sd = want->pose_place_sd};
-        s->path = &p->path;
-    }
     (void)further_open(&p->further, want->further_streams, want->stream, why); /* checked with the settings */
     s->further = p->further.count ? &p->further : NULL;
+    if (want->moving_camera)
+        open_paths(s, want, p);
     s->max_gap = (double)want->max_gap;
     s->max_pixels = want->max_pixels;
     s->budget = (budget){.limit_us = (int64_t)(1e3f * want->budget_ms),
@@ -177,6 +188,9 @@ static void print_summary(const service *s, bool live)
         const further_camera *const each = &s->further->camera[i];
         printf(" stream_%d_used %" PRId64 " stream_%d_missing %" PRId64, each->stream, each->used,
                each->stream, each->missing);
+        if (each->path)
+            printf(" stream_%d_poses_refused %" PRId64 " stream_%d_frames_without_pose %" PRId64,
+                   each->stream, each->path->refused, each->stream, each->path->unknown);
     }
     if (s->lift)
         printf(" lift_frames %" PRId64 " lifted %" PRId64 " lift_rejected %" PRId64

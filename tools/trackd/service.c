@@ -221,14 +221,22 @@ int64_t service_pixels_left(const service *s, const camera_slot *slot)
     return left > 0 ? left : 0;
 }
 
+/* The poses of a camera; NULL: it stands still. */
+static pose_path *path_of(const service *s, const further_camera *c)
+{
+    return c ? c->path : s->path;
+}
+
 /* The camera of a message.  Its pose must be plausible, unless it is one of the poses of a moving camera. */
-static bool take_camera(const service *s, const camera_slot *slot, int stream, const gaitmsg_camera_t *msg,
+static bool take_camera(const service *s, const further_camera *c, const gaitmsg_camera_t *msg,
                         gait_camera *out, message *why)
 {
+    const camera_slot *const slot = c ? &c->slot : &s->slot;
     char channel[24];
-    snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", stream);
+    snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", c ? c->stream : s->stream);
     return camera_from_message(msg, service_pixels_left(s, slot), out, why) &&
-           ((s->path && slot->known && same_lens(out, &slot->camera)) || camera_plausible(out, channel, why));
+           ((path_of(s, c) && slot->known && same_lens(out, &slot->camera)) ||
+            camera_plausible(out, channel, why));
 }
 
 /* The new camera is in its slot: begin anew with it. */
@@ -260,16 +268,17 @@ static void set_refused(service *s, const message *why)
 void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, int64_t arrival)
 {
     camera_slot *const slot = c ? &c->slot : &s->slot;
+    pose_path *const path = path_of(s, c);
     gait_camera camera;
     message why, refused = {.text = ""};
-    if (!take_camera(s, slot, c ? c->stream : s->stream, msg, &camera, &refused)) {
+    if (!take_camera(s, c, msg, &camera, &refused)) {
         service_complain(s, "%s", refused.text);
         if (!c)
             set_refused(s, &refused);
         return;
     }
-    if (s->path && (!slot->known || same_lens(&camera, &slot->camera))) {
-        if (!pose_path_add(s->path, msg->utime, &camera, &why))
+    if (path && (!slot->known || same_lens(&camera, &slot->camera))) {
+        if (!pose_path_add(path, msg->utime, &camera, &why))
             service_complain(s, "%s", why.text);
         camera = slot->known ? slot->camera : camera;
     }
@@ -280,7 +289,7 @@ void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, 
         service_complain(s,
                          "a different camera from the one in use was announced: it replaces that one after "
                          "10 seconds in which only it is announced%s",
-                         !s->path && same_lens(&camera, &slot->camera)
+                         !path && same_lens(&camera, &slot->camera)
                              ? "; if the camera moves, run with --moving-camera"
                              : "");
     else if (answer == CAMERA_NEW && !begin_anew(s, c, &refused))

@@ -53,7 +53,7 @@ typedef struct service {
     gait_track_status last_status;
     lift_service *lift; /* the second service; NULL: not requested */
     keypoint_cue *cue;  /* a detector's keypoints for the tracker; NULL: not requested */
-    pose_path *path;    /* poses of a camera that moves; NULL: it stands still */
+    pose_path *path;    /* poses of the first camera, which moves; NULL: it stands still */
     further *further;   /* further cameras; NULL: there is one */
     camera_slot slot;   /* the first camera; the tracker is there when all cameras are known */
     frame_hold hold;    /* the frame that waits for keypoints, a pose or further cameras */

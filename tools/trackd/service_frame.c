@@ -259,8 +259,8 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
         return false;
     }
     compare_scene(s, &frame.image[0]);
-    if (s->further)
-        further_images(s->further, v->utime, &frame);
+    if (s->further && !further_images(s->further, v->utime, &frame, &why))
+        service_complain(s, "%s", why.text);
     if (s->cue)
         frame.keypoints[0] = keypoint_cue_use(s->cue, v->utime);
     if (s->path && pose_path_now(s->path, v->utime, &pose, &why))

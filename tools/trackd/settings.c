@@ -185,7 +185,7 @@ static int make_table(settings *s, option *table)
          "        (tracks2_t)",
          OPTION_FLOAT, &s->keypoints_sd, 0.01, 1000},
         {"moving-camera", 0, "",
-         "the camera moves: each message on GAIT_CAMERA_<i> gives its pose at that time; poses are\n"
+         "the cameras move: each message on GAIT_CAMERA_<i> gives the pose at that time; poses are\n"
          "        interpolated, and a frame waits for its pose until the next frame arrives",
          FLAG(moving_camera)},
         {"pose-turn-sd", 0, "DEG", "standard deviation of the rotation of these poses, default 0 degrees",
@@ -269,7 +269,6 @@ static bool check_dependencies(const settings *s, message *why)
         {"pose-turn-sd", "moving-camera", s->pose_turn_sd > 0, s->moving_camera},
         {"pose-place-sd", "moving-camera", s->pose_place_sd > 0, s->moving_camera},
         {"lift", "a static camera", s->lift, !s->moving_camera},
-        {"further-streams", "a static camera", s->further_streams[0], !s->moving_camera},
         {"further-streams", "a background on GAIT_BACKGROUND_<i>, not --background", s->further_streams[0],
          !s->background[0]},
         {"background", "a static camera", s->background[0], !s->moving_camera},
