@@ -493,8 +493,8 @@ GAIT_API gait_result gait_tracker_init(void *mem, size_t mem_bytes, const gait_m
  * silhouette term then has no effect.  Snapshots do not contain it. */
 GAIT_API gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate,
                                                  gait_error *err);
-/* Broad prior: uniform phase, average stride rate and stature, unknown heading, pelvis at the origin; with several classes
- * also an unknown turn rate (sd 0.25 rad/s). */
+/* Broad prior: uniform phase, average stride rate and stature, unknown heading, pelvis at the origin, a turn rate with an sd
+ * of 0.25 rad/s. */
 GAIT_API gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd, gait_error *err);
 /* Draw the particles from independent normals; a phase or heading with an sd of half a turn or more is uniform, and half of
  * the particles have the mean turn rate, the others one with 1.41 times the sd.  Means must be in the ranges of gait_state,

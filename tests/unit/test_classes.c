@@ -370,25 +370,6 @@ static void test_pace_lasts(void)
     CHECK_NEAR(dynamics_step_init(&of_one, 0.1f, 2.0f, 0).rate.keep, exp(-0.1 / (double)cfg.rate_time), 1e-6);
 }
 
-/* A start that does not state the turn rate: half of the people who change class do not turn, others do; with one class
- * the path is straight. */
-static void test_starts_turning(void)
-{
-    gait_tracker_config const cfg = settings();
-    dynamics const d = {
-        .cfg = &cfg, .rule = state_layout_init(model(), &cfg, kernels_choose(~0u)), .seed = 3};
-    gait_state mean, sd;
-    int32_t straight = 0, left = 0;
-    CHECK(gait_tracker_prior(toy_model(), &mean, &sd, NULL) == GAIT_OK && sd.turn_rate == 0.0f);
-    CHECK(gait_tracker_prior(model(), &mean, &sd, NULL) == GAIT_OK && sd.turn_rate == 0.25f);
-    for (int32_t i = 0; i < 2000; i++) {
-        float const turn = dynamics_draw(&d, &mean, &sd, NULL, i).f[F_TURN];
-        straight += turn == 0.0f;
-        left += turn > 0.1f;
-    }
-    CHECK(straight > 900 && straight < 1100 && left > 300 && left < 480);
-}
-
 /* Of people who seemed to stand for a moment nine in ten walk on as if they had not stood, at their own rate. */
 static void test_resumes(void)
 {
@@ -425,7 +406,6 @@ static void all(void)
     test_another_order();
     test_rates();
     test_pace_lasts();
-    test_starts_turning();
     test_resumes();
     test_starts();
     test_one_class();

@@ -111,9 +111,29 @@ static void test_draw_broad(void)
     CHECK(chi2[0] < 37.7 && chi2[1] < 37.7); /* 15 degrees of freedom, p = 0.001 */
 }
 
+/* A start that does not state the turn rate: half of the people do not turn, others do; in paper mode nobody does. */
+static void test_draw_turns(void)
+{
+    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
+        dynamics const d = quiet(mode, 5);
+        gait_state mean, sd;
+        int32_t straight = 0, left = 0;
+        CHECK(gait_tracker_prior(toy_model(), &mean, &sd, NULL) == GAIT_OK && sd.turn_rate == 0.25f);
+        for (int32_t i = 0; i < 2000; i++) {
+            float const turn = dynamics_draw(&d, &mean, &sd, NULL, i).f[F_TURN];
+            straight += turn == 0.0f;
+            left += turn > 0.1f;
+        }
+        bool const paper = mode == GAIT_MODE_PAPER;
+        CHECK(straight >= (paper ? 2000 : 900) && straight < (paper ? 2001 : 1100));
+        CHECK(paper ? left == 0 : left > 300 && left < 480);
+    }
+}
+
 int main(void)
 {
     test_draw();
+    test_draw_turns();
     test_draw_exact();
     test_draw_level();
     test_draw_broad();

@@ -131,8 +131,7 @@ gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const g
     return GAIT_OK;
 }
 
-/* Radians per second; half of the people do not turn (dynamics_draw()).  A model of one class assumes a straight path until
- * left and right are known. */
+/* Radians per second; half of the people do not turn (dynamics_draw()). */
 static const float TURN_SD = 0.25f;
 
 gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd, gait_error *err)
@@ -150,7 +149,7 @@ gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
                        .pitch = 0.02f,
                        .roll = 0.02f,
                        .pelvis = {1.0f, 1.0f, 0.1f},
-                       .turn_rate = m->classes > 1 ? TURN_SD : 0.0f};
+                       .turn_rate = TURN_SD};
     for (int32_t k = 0; k < m->components; k++)
         sd->coef[k] = 1.0f;
     for (int32_t k = 0; k < m->proportions; k++)

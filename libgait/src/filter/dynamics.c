@@ -58,7 +58,9 @@ particle_state dynamics_draw(const dynamics *d, const gait_state *mean, const ga
     s.roll += sd->roll * n[5];
     s.pelvis[0] += sd->pelvis[0] * n[6];
     s.pelvis[1] += sd->pelvis[1] * n[7];
-    s.turn_rate += u[2] < 0.5f ? 0.0f : 1.41421356f * sd->turn_rate * n[F_TURN]; /* half do not turn */
+    float const turn_sd =
+        f_min(1.41421356f * sd->turn_rate, d->cfg->turn_sd); /* of those who turn, which half do not */
+    s.turn_rate += u[2] < 0.5f ? 0.0f : turn_sd * n[F_TURN];
     for (int32_t k = 0; k < q; k++)
         s.coef[k] += d->cfg->coef_start * sd->coef[k] * n[F_COEF + k];
     for (int32_t k = 0; k < d->rule.proportions; k++)
