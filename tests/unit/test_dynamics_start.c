@@ -111,7 +111,7 @@ static void test_draw_broad(void)
     CHECK(chi2[0] < 37.7 && chi2[1] < 37.7); /* 15 degrees of freedom, p = 0.001 */
 }
 
-/* A start that does not state the turn rate: half of the people do not turn, others do; in paper mode nobody does. */
+/* A start that does not state the turn rate: half of the people do not turn, others do; in paper mode none does. */
 static void test_draw_turns(void)
 {
     for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
