@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gait.io.detections import Clip, Detection, Detections, one_person
+from gait.io.detections import Clip, Detection, Detections, read_people
 
 NAMES = ("l_hip", "r_hip", "l_ankle", "r_ankle")
 BODY = np.array([[0, 0], [10, 0], [0, 100], [10, 100]], float)
@@ -19,9 +19,10 @@ def observed(places):
 
 def hips(found, frames, person=None):
     """The left hip's u of a person; by default of the one in view most."""
-    frame, _, _, uv, _, _ = one_person("k", Detections(NAMES, found, fps=30.0), Clip(person=person))
-    assert frame.tolist() == list(frames)
-    return uv[:, 0, 0]
+    people, _, _ = read_people("k", Detections(NAMES, found, fps=30.0), Clip(person=person))
+    first = next(iter(people.values()))
+    assert first.frame.tolist() == list(frames)
+    return first.uv[:, 0, 0]
 
 
 def test_people_who_meet_while_none_is_found_are_not_taken_for_each_other(capsys):

@@ -123,7 +123,7 @@ def test_offsets_come_from_repaired_sides_and_a_swapped_frame_is_no_spike(views,
         synchronise, "find_offset", lambda *given: observed.append(given[2]) or found_of(*given)
     )
     monkeypatch.setattr(run, "best_sides", as_joined)
-    films = [FilmedView("a.csv", files[0], views[0]), FilmedView("b.csv", files[1], spoilt)]
+    films = [FilmedView("a.csv", files[0], {"0": views[0]}), FilmedView("b.csv", files[1], {"0": spoilt})]
     lifted = run.lift_views(films, None, SegmentPrior.load(), Request(Options()), lambda _: None, True)
     alone, together = observed
     np.testing.assert_array_equal(alone.uv[15:24], late.uv[15:24])

@@ -236,3 +236,60 @@ def test_each_view_keeps_its_own_noise(tmp_path, monkeypatch, joined_of):
     least = Options.pixel_sd
     np.testing.assert_array_equal(calm.changing(least), least / 0.5)
     np.testing.assert_allclose(noisy.changing(least), 12.0, rtol=0.15)
+
+
+def openpose(folder, *people, step=1):
+    """Write people as OpenPose does, in every `step`-th frame; none where all points of a row are missing."""
+    folder.mkdir()
+    joints = [joint_named(name) for name in points_of(25)]
+    for t in range(len(people[0].time)):
+        shown = []
+        for one in people:
+            points = np.zeros((25, 3))
+            for k, joint in enumerate(joints):
+                if joint in one.names and np.isfinite(one.uv[t, one.names.index(joint)]).all():
+                    points[k] = *one.uv[t, one.names.index(joint)], 1.0
+            if points.any():
+                shown.append({"person_id": [-1], "pose_keypoints_2d": points.ravel().tolist()})
+        (folder / f"f_{step * t:012d}_keypoints.json").write_text(json.dumps({"people": shown}))
+
+
+@pytest.fixture
+def crowd(tmp_path, monkeypatch):
+    """Views of OpenPose: the person, and by another camera the person in fewer frames, and another person."""
+    monkeypatch.chdir(tmp_path)
+    openpose(tmp_path / "a", walking.keypoints(walking.view(), noise=0.5))
+    person, other = (walking.keypoints(SIDE, walk, noise=0.5) for walk in (walking.TOWARDS, walking.ACROSS))
+    person.uv[30:] = np.nan
+    openpose(tmp_path / "b", other, person, step=2)
+    for name, camera in (("a", walking.view()), ("b", SIDE)):
+        write_camera(tmp_path / f"{name}.json", camera)
+    return person
+
+
+def test_the_person_of_a_further_view_is_the_one_of_the_first(crowd, joined_of, capsys):
+    words = ("a", "b", *VIEWS, "--fps", 15, "--fps", 30)
+    (first, further), (offset,) = joined_of(*words)
+    assert "b: has 2 people: 0 (45 frames), 1 (30 frames); took 1, whose joints fit a best (" in (
+        capsys.readouterr().err
+    )
+    assert offset == 0 and further.time == pytest.approx(first.time[:30])
+    shared = [name for name in crowd.names if name in further.names]
+    right, found = ([of.names.index(name) for name in shared] for of in (crowd, further))
+    np.testing.assert_allclose(further.uv[:, found], crowd.uv[:30, right], atol=1e-6)
+    (_, other), _ = joined_of(*words, "--person", "0", "--offsets", "0")
+    assert len(other.time) == 45
+    (_, chosen), _ = joined_of(*words, "--person", "0", "--person", "1", "--offsets", "0")
+    np.testing.assert_array_equal(chosen.uv, further.uv)
+
+
+def test_one_rate_is_for_the_files_that_have_no_times(crowd, joined_of, capsys):
+    write("a.csv", walking.keypoints(walking.view()))
+    (own, foreign), _ = joined_of("a.csv", "b", *VIEWS, "--fps", 30, "--offsets", "0")
+    assert own.time[1] == pytest.approx(1 / 15, abs=1e-6) and foreign.time[1] == pytest.approx(1 / 15)
+    for files, message in (
+        (("a.csv", "b"), "--fps: 2 for 1 file of other tools; give one for each, or one for all"),
+        (("a.csv", "a.csv"), "--fps: is for files of other tools, and no view has one"),
+    ):
+        assert main(["lift", *files, *VIEWS, "--fps", "30", "--fps", "15", "-o", "x.csv"]) == 2
+        assert message in capsys.readouterr().err

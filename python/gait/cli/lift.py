@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from gait.bindings.segment_prior import SegmentPrior
     from gait.io.detections import Clip
     from gait.lift.detected import Detected, Request
+    from gait.lift.run import FilmedView
     from gait.track.from_walk import Calibration
 
 EXAMPLES = """\
@@ -198,12 +199,13 @@ def _add_keypoints(group: argparse._ArgumentGroup) -> None:
     for option, help in switches:
         add(option, action="store_true", help=help)
     add("--trc", type=values.named(".trc"), metavar="O.trc", help="also write the positions for OpenSim")
-    values.add_person(group)
+    values.add_person(group, several=True)
     add(
         "--fps",
+        action="append",
         type=values.between(1, 1e5, "frames per second"),
         metavar="HZ",
-        help="frames per second of another tool's keypoints, which number frames from 0",
+        help="frames per second of another tool's keypoints, which number frames from 0; " + values.EACH_VIEW,
     )
     add(
         "--video",
@@ -318,6 +320,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
     from gait.track.camera_check import contradiction
 
     _check(args, video)
+    clips = _clips(args)
     warn = partial(note, quiet=args.quiet)
     prior = lift_run.load_prior(args.model, warn)
     in_video = _detect(args, prior, args.input, args.camera) if video else None
@@ -334,16 +337,12 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
         keep_sides=args.keep_sides,
         keep_spikes=args.keep_spikes,
         all_markers=args.all_markers,
-        clip=_clip(args, args.camera),
+        clip=clips[0],
         stabilised=args.stabilize == "auto",
         corrections=args.corrections,
     )
     if args.further:
-        own = in_video.keypoints if in_video else None
-        views = [lift_run.FilmedView(args.input, args.camera, own, request.clip)]
-        for path, camera in args.further:
-            own = _detect(args, prior, path, camera).keypoints if _is_video(path, False) else None
-            views.append(lift_run.FilmedView(path, camera, own, _clip(args, camera)))
+        views = _filmed(args, prior, in_video, clips)
         lifted = lift_run.lift_views(views, args.offsets, prior, request, warn, args.quiet)
     elif in_video is None:
         lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
@@ -408,8 +407,29 @@ def _request(args: argparse.Namespace, video: str, camera: str | None) -> Reques
     )
 
 
-def _clip(args: argparse.Namespace, camera: str | None) -> Clip:
-    """Collect what a view's file of another tool may lack: person, times, and the size of the picture."""
+def _views(args: argparse.Namespace) -> list[tuple[str, str]]:
+    """File and camera of each view."""
+    return [(args.input, args.camera), *args.further]
+
+
+def _filmed(
+    args: argparse.Namespace, prior: SegmentPrior, in_video: Detected | None, clips: list[Clip]
+) -> list[FilmedView]:
+    """Collect several views; `in_video`: what was found in the first, if it is a film."""
+    from gait.lift.run import FilmedView
+
+    views: list[FilmedView] = []
+    for (path, camera), clip in zip(_views(args), clips, strict=True):
+        found = None if views else in_video
+        if views and _is_video(path, False):
+            found = _detect(args, prior, path, camera)
+        people = {str(id): one for id, one in found.people.items()} if found else None
+        views.append(FilmedView(path, camera, people, clip))
+    return views
+
+
+def _clips(args: argparse.Namespace) -> list[Clip]:
+    """Collect what each view's file of another tool may lack: person, times, and the size of the picture."""
     from gait.camera.camera import Camera
     from gait.io.detections import Clip
 
@@ -419,9 +439,33 @@ def _clip(args: argparse.Namespace, camera: str | None) -> Clip:
 
         film = Video(args.video)
         size, times = film.size, film.times
-    elif camera:
-        size = Camera.read(camera).size
-    return Clip(args.person, args.fps, times, size, args.quiet)
+    clips = []
+    people, rates = (_of_views(args, option) for option in ("person", "fps"))
+    for (_, camera), person, fps in zip(_views(args), people, rates, strict=True):
+        own = Camera.read(camera).size if camera and not size else size
+        clips.append(Clip(person, fps, times, own, args.quiet))
+    return clips
+
+
+def _of_views(args: argparse.Namespace, option: str) -> list[Any]:
+    """Assign the values of an option to the views with files of another tool; None to others."""
+    from gait.io.detector_formats import reader_of
+
+    given, paths = getattr(args, option) or [], [path for path, _ in _views(args)]
+    if not given:
+        return [None] * len(paths)
+    if len(paths) == len(given) == 1:
+        return list(given)
+    foreign = [Path(path).exists() and reader_of(path) is not None for path in paths]
+    if not any(foreign):
+        raise UsageError(f"--{option}: is for files of other tools, and no view has one")
+    if len(given) not in (1, sum(foreign)):
+        raise UsageError(
+            f"--{option}: {len(given)} for {count_of(sum(foreign), 'file')} of other tools; give one for "
+            "each, or one for all"
+        )
+    each = iter(given if len(given) > 1 else given * sum(foreign))
+    return [next(each) if own else None for own in foreign]
 
 
 def _write_camera(args: argparse.Namespace, calibration: Calibration | None) -> None:

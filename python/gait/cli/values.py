@@ -119,6 +119,10 @@ def add_camera(
         )
 
 
+#: How often an option about files of other tools may be given.
+EACH_VIEW = "of several views one for each such file in their order, or one for all"
+
+
 def offsets(text: str) -> tuple[float, ...]:
     """Parse seconds, separated by commas."""
     try:
@@ -209,13 +213,15 @@ def add_clip(parser: ArgumentParser, use: str, init: str = "auto", background: s
     parser.add_argument("--stop", type=whole(0), metavar="F", help=f"first frame not to {use}")
 
 
-def add_person(parser: _ActionsContainer) -> None:
-    """Add ``--person``."""
+def add_person(parser: _ActionsContainer, several: bool = False) -> None:
+    """Add ``--person``, with `several` one for each view."""
+    further = ", and in further views the one whose joints fit the first view best" * several
     parser.add_argument(
         "--person",
+        action="append" if several else "store",
         metavar="ID",
         help="which of several people in another tool's file: a track, individual or number from the note "
-        "that lists them (default: the one who is seen most)",
+        f"that lists them (default: the one who is seen most{further})" + f"; {EACH_VIEW}" * several,
     )
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from gait.io.layouts import LAYOUTS, joint_named, points_of
 from gait.progress import note
 
 Array = NDArray[np.float64]
+_T = TypeVar("_T")
+_U = TypeVar("_U")
 
 _LONGEST_BREAK = 30  # frames; a person who is missing for longer counts as another one
 _SHORT_BREAK = 5  # frames; people who are missing for longer may have changed places
@@ -27,7 +29,7 @@ _NAMED = 6  # most people that a note lists
 class Clip:
     """What a user can add to files of other tools: which person to use, and facts about the video."""
 
-    person: str | None = None  #: id of the person to use; None: the one who is seen most
+    person: str | None = None  #: id of the person to use; None: the one who is seen most comes first
     fps: float | None = None  #: frames per second
     times: Array | None = None  #: (n,) seconds of the video's frames
     size: tuple[int, int] | None = None  #: width and height of the picture, pixels
@@ -73,13 +75,22 @@ def names_of(where: str, count: int, given: Sequence[str] = ()) -> tuple[str, ..
     return names
 
 
-def one_person(
-    path: str | os.PathLike[str], detected: Detections, clip: Clip
-) -> tuple[NDArray[np.int64], Array, tuple[str, ...], Array, Array, list[str]]:
-    """Choose one person and the points that are joints of the model.
+@dataclass(frozen=True)
+class Person:
+    """Joints of the model of one person in T frames."""
 
-    Returns frames (T,), their times (T,) in seconds, the names of J joints, u and v (T, J, 2) in pixels, NaN
-    where not seen, confidences (T, J) from 0 to 1, and the names of points that are not joints of the model.
+    frame: NDArray[np.int64]  #: (T,) numbers
+    time: Array  #: (T,) seconds
+    uv: Array  #: (T, J, 2) pixels, NaN where not seen
+    confidence: Array  #: (T, J) from 0 to 1
+
+
+def read_people(
+    path: str | os.PathLike[str], detected: Detections, clip: Clip
+) -> tuple[dict[str, Person], tuple[str, ...], list[str]]:
+    """Link the people, those with the largest frames times extent first, or only the one asked for.
+
+    Also returns the names of the J joints, and those of points that are not joints of the model.
     UserError in one line that names the file.
     """
     joints = [joint_named(name, detected.own) for name in detected.names]
@@ -97,7 +108,35 @@ def one_person(
             "after a gap; from there they count as others",
             clip.quiet,
         )
-    chain = _choose(path, people, clip)
+    if detected.shares and clip.size is None:
+        raise UserError(
+            f"{path}: has fractions of the picture's width and height; give --video or --camera for its size"
+        )
+
+    def person(chain: list[Detection]) -> Person:
+        return _person(path, chain, used, detected, clip)
+
+    found = usable(_ranked(path, people, clip), person)
+    names = tuple(joints[i] for i in used)
+    return found, names, [name for i, name in enumerate(detected.names) if name and i not in used]
+
+
+def usable(people: Mapping[str, _T], convert: Callable[[_T], _U]) -> dict[str, _U]:
+    """Convert people; leave out those after the first whose conversion raises UserError."""
+    found: dict[str, _U] = {}
+    for id, person in people.items():
+        try:
+            found[id] = convert(person)
+        except UserError:
+            if not found:
+                raise
+    return found
+
+
+def _person(
+    path: str | os.PathLike[str], chain: list[Detection], used: list[int], detected: Detections, clip: Clip
+) -> Person:
+    """Return the points with indices `used` of a person's detections."""
     frame = np.array([detection.frame for detection in chain], np.int64)
     points = np.stack([detection.points[used] for detection in chain])
     uv = points[..., :2].copy()
@@ -105,15 +144,9 @@ def one_person(
     unseen = (confidence <= 0) | (uv == 0).all(axis=2) | (uv == -1).all(axis=2) | ~np.isfinite(uv).all(axis=2)
     uv[unseen], confidence[unseen] = np.nan, 0.0
     if detected.shares:
-        if clip.size is None:
-            raise UserError(
-                f"{path}: has fractions of the picture's width and height; give --video or --camera for its "
-                "size"
-            )
+        assert clip.size is not None
         uv = uv * clip.size - 0.5  # pixel centres at integers
-    names = tuple(joints[i] for i in used)
-    ignored = [name for i, name in enumerate(detected.names) if name and i not in used]
-    return frame, _times(path, frame, detected, clip), names, uv, confidence, ignored
+    return Person(frame, _times(path, frame, detected, clip), uv, confidence)
 
 
 def _people(found: Sequence[Detection]) -> tuple[dict[str, list[Detection]], list[int]]:
@@ -194,22 +227,30 @@ def _visible(points: Array) -> NDArray[np.bool_]:
     return np.isfinite(points).all(axis=1) & (points[:, 2] > 0)
 
 
-def _choose(path: str | os.PathLike[str], people: dict[str, list[Detection]], clip: Clip) -> list[Detection]:
-    """Return the detections of the person asked for, or of the one with the largest frames times extent."""
+def _ranked(
+    path: str | os.PathLike[str], people: dict[str, list[Detection]], clip: Clip
+) -> dict[str, list[Detection]]:
+    """Return the people's visible detections, those with the largest frames times extent first.
+
+    Only those of the person asked for, if any.
+    """
     visible = {name: [d for d in chain if _visible(d.points).any()] for name, chain in people.items()}
     weight = {name: sum(_extent(d.points) for d in chain) for name, chain in visible.items() if chain}
     if not weight:
         raise UserError(f"{path}: no point of a person is visible in any frame")
-    ranked = sorted(weight, key=lambda name: -weight[name])
-    listed = ", ".join(f"{name} ({len(visible[name])} frames)" for name in ranked[:_NAMED])
-    listed += f" and {len(ranked) - _NAMED} more" * (len(ranked) > _NAMED)
-    if clip.person is not None:
-        if clip.person not in weight:
-            raise UserError(f"{path}: has no person {clip.person}; --person is one of {listed}")
-        return visible[clip.person]
-    if len(ranked) > 1:
-        note(f"{path}: has {len(ranked)} people: {listed}; took {ranked[0]} (--person)", clip.quiet)
-    return visible[ranked[0]]
+    ranked = {name: visible[name] for name in sorted(weight, key=lambda name: -weight[name])}
+    if clip.person is None:
+        return ranked
+    if clip.person not in ranked:
+        counts = {name: len(chain) for name, chain in ranked.items()}
+        raise UserError(f"{path}: has no person {clip.person}; --person is one of {listed(counts)}")
+    return {clip.person: ranked[clip.person]}
+
+
+def listed(people: Mapping[str, int]) -> str:
+    """List people by id, with the number of frames in which each is seen."""
+    words = ", ".join(f"{name} ({count} frames)" for name, count in list(people.items())[:_NAMED])
+    return words + f" and {len(people) - _NAMED} more" * (len(people) > _NAMED)
 
 
 def _extent(points: Array) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import csv
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,10 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError
-from gait.io.detections import Clip, one_person
+from gait.io import detections
+from gait.io.detections import Clip
 from gait.io.detector_formats import KNOWN, Reader, reader_of
 from gait.io.fields import frame_numbers, table_rows
 from gait.io.files import replacing, require_no_device
+from gait.progress import note
 
 Array = NDArray[np.float64]
 
@@ -209,11 +211,28 @@ def read(
 ) -> tuple[Keypoints, list[str]]:
     """Read keypoints of points named in `known`, from the package's CSV or a file or folder of another tool.
 
-    `clip`: what other tools' files may lack.  Also returns the ignored points, which are not in `known`.
+    `clip`: what other tools' files may lack.  Of several people the one who is seen most is taken, with a
+    note.  Also returns the ignored points, which are not in `known`.
     UserError if the file is malformed, contains no point, or, unless `ignore_unknown`, contains one that is
     not known; files of other tools may always have such points.
     """
     clip = clip or Clip()
+    people, ignored = read_people(path, known, ignore_unknown, clip)
+    person = next(iter(people))
+    if len(people) > 1:
+        note(f"{path}: has {listed(people)}; took {person} (--person)", clip.quiet)
+    return people[person], ignored
+
+
+def listed(people: Mapping[str, Keypoints]) -> str:
+    """List several people by id, with the number of frames in which each is seen."""
+    return f"{len(people)} people: {detections.listed({id: len(one.frame) for id, one in people.items()})}"
+
+
+def read_people(
+    path: str | os.PathLike[str], known: Sequence[str], ignore_unknown: bool, clip: Clip
+) -> tuple[dict[str, Keypoints], list[str]]:
+    """Read the keypoints of everyone in a file, as `read` does; the one who is seen most comes first."""
     if not Path(path).exists():
         raise UserError(f"{path}: no such file of keypoints; check the name")
     require_no_device(path, "file of keypoints")
@@ -277,7 +296,7 @@ def read(
     found = Keypoints(
         frame, time, tuple(names), uv, confidence, lasting_s=lasting_s, repeated=repeated, **errors
     )
-    return found, ignored
+    return {"0": found}, ignored
 
 
 def _require_seconds(path: str | os.PathLike[str], time: Array) -> None:
@@ -293,21 +312,29 @@ def _require_seconds(path: str | os.PathLike[str], time: Array) -> None:
 
 def _read_foreign(
     path: str | os.PathLike[str], reader: Reader, known: Sequence[str], clip: Clip
-) -> tuple[Keypoints, list[str]]:
-    """Read one person of another tool's file, as `read` does."""
-    frame, time, names, uv, confidence, ignored = one_person(path, reader(path), clip)
-    _require_seconds(path, time)
+) -> tuple[dict[str, Keypoints], list[str]]:
+    """Read another tool's file, as `read_people` does."""
+    found, names, ignored = detections.read_people(path, reader(path), clip)
     kept = [i for i, name in enumerate(names) if name in known]
     if not kept:
         raise UserError(f"{path}: no point of the model; its points are {' '.join(names)}")
-    uv, confidence = uv[:, kept], confidence[:, kept]
+    ignored += [name for name in names if name not in known]
+    people = detections.usable(found, lambda person: _joints_of(path, person, names, kept))
+    return people, ignored
+
+
+def _joints_of(
+    path: str | os.PathLike[str], person: detections.Person, names: Sequence[str], kept: list[int]
+) -> Keypoints:
+    """Return the joints of one person with indices `kept`."""
+    _require_seconds(path, person.time)
+    uv, confidence = person.uv[:, kept], person.confidence[:, kept]
     if not (np.abs(uv[np.isfinite(uv)]) <= FURTHEST).all():
         raise UserError(f"{path}: a point is more than {FURTHEST:g} pixels off; write the file again")
     uv[confidence < LEAST_CONFIDENCE] = np.nan
     if not np.isfinite(uv).any():
         raise UserError(f"{path}: no point has a confidence of {LEAST_CONFIDENCE:g} or more")
-    ignored += [name for name in names if name not in known]
-    return Keypoints(frame, time, tuple(names[i] for i in kept), uv, confidence), ignored
+    return Keypoints(person.frame, person.time, tuple(names[i] for i in kept), uv, confidence)
 
 
 def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:

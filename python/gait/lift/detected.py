@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gait.bindings.model import walking_model
@@ -59,17 +60,23 @@ class Detected:
 
     Attributes
     ----------
-    keypoints : Keypoints
-        If there are `turns`, in pixels of the reference's camera.
+    people : mapping of id to Keypoints
+        First the person to lift, or of several views of the first one.  If there are `turns`, in pixels of
+        the reference's camera.
     calibration : Calibration, optional
         The camera, if it was estimated.
     turns : CameraTurns, optional
         How the camera turns; None if it is static or turns are not to be undone.
     """
 
-    keypoints: Keypoints
+    people: Mapping[int, Keypoints]
     calibration: Calibration | None = None
     turns: CameraTurns | None = None
+
+    @property
+    def keypoints(self) -> Keypoints:
+        """Keypoints of the person to lift."""
+        return next(iter(self.people.values()))
 
 
 def find_keypoints(request: Request, prior: SegmentPrior, quiet: bool) -> Detected:
@@ -96,9 +103,9 @@ def find_keypoints(request: Request, prior: SegmentPrior, quiet: bool) -> Detect
     if turns is not None:
         people = {id: turns.in_reference(keypoints) for id, keypoints in people.items()}
     if request.camera or request.parallel:
-        return Detected(next(iter(people.values())), None, turns)
+        return Detected(people, None, turns)
     id, calibration = _calibrate(request, video, people, quiet)
-    return Detected(people[id], calibration, turns)
+    return Detected({id: people[id]}, calibration, turns)
 
 
 def find_camera(request: Request, prior: SegmentPrior, quiet: bool) -> Calibration:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -29,7 +29,7 @@ from gait.lift.view_sides import best_sides
 from gait.progress import progress
 from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
-from gait.track.synchronise import Film, no_shared_frame, synchronise
+from gait.track.synchronise import Film, no_shared_frame, same_person, synchronise
 
 #: Recordings; with two of one person, 90 % intervals for other people contained as little as 70 %.
 FEW_RECORDINGS = 4
@@ -108,15 +108,15 @@ class FilmedView:
         Film, or file of keypoints.
     camera : str
         Camera file.
-    keypoints : Keypoints, optional
-        Those found in the film; None to read them from `path`.
+    people : mapping of id to Keypoints, optional
+        Those found in the film, the person seen most first; None to read them from `path`.
     clip : Clip
         What a keypoint file of another tool may lack, as in `Request`.
     """
 
     path: str
     camera: str
-    keypoints: Keypoints | None = None
+    people: Mapping[str, Keypoints] | None = None
     clip: Clip = Clip()
 
 
@@ -216,6 +216,8 @@ def lift_views(
 ) -> Lifted:
     """Lift the keypoints of several cameras together, in the frames of the first.
 
+    The person is the one who is seen most in the first view, and in others the one whose joints fit it best.
+
     Parameters
     ----------
     views : sequence of FilmedView
@@ -228,26 +230,28 @@ def lift_views(
         One line that names the file.
     """
     prepared: list[Prepared] = []
-    films: list[Film[int]] = []
+    films: list[Film[str]] = []
     began: list[float] = []
     for number, view in enumerate(views):
-        path, keypoints = view.path, view.keypoints
+        path, people = view.path, view.people
+        own = replace(request, camera=view.camera, clip=view.clip)
+        given = offsets[number - 1] if number and offsets is not None else None
 
         def named(words: str, path: str = path) -> None:
             warn(f"{path}: {words}")
 
-        if keypoints is None:
-            keypoints, _ = keypoints_file.read(path, prior.names, request.ignore_unknown, view.clip)
-        own = replace(request, camera=view.camera, clip=view.clip)
+        if people is None:
+            people, _ = keypoints_file.read_people(path, prior.names, request.ignore_unknown, view.clip)
+        person = _person(people, films, own, given, named)
+        keypoints = people[person]
         one = prepare(path, keypoints, prior, own, named, quiet, sides_later=not request.keep_sides)
         assert isinstance(one.view, Perspective)
         sided = one.keypoints  # with left and right as this view alone shows them
         if offsets is None and not request.keep_sides:
             with suppress(UserError):  # too little may be visible in one view
                 sided = prepare(path, keypoints, prior, own, lambda _: None, quiet).keypoints
-        film = Film(path, one.view.camera, {0: sided}, 0)
+        film = Film(path, one.view.camera, {person: sided}, person)
         if films:
-            given = None if offsets is None else offsets[number - 1]
             _, offset, words = synchronise(films, film, given)
             began.append(offset.seconds)
             named(words)
@@ -282,6 +286,28 @@ def lift_views(
             repairs["swapped"] += int((after.visible & (after.uv != before.uv).any(axis=2)).sum())
     usual = replace(options, pixel_sd=float(np.median(np.array(noise)[camera_of])))
     return replace(lifted, options=usual, repairs=repairs)
+
+
+def _person(
+    people: Mapping[str, Keypoints],
+    films: Sequence[Film[str]],
+    request: Request,
+    given: float | None,
+    warn: Warn,
+) -> str:
+    """Choose the person of a view: who is seen most, or whose joints fit the first of `films` best."""
+    person = next(iter(people))
+    if len(people) == 1:
+        return person
+    why = ""
+    if films:
+        assert request.camera is not None
+        camera = Camera.read(request.camera, request.size, scale=True)
+        person, offset = same_person(films[0], Film("", camera, people, person), given)
+        if np.isfinite(offset.mismatch):
+            why = f", whose joints fit {films[0].path} best ({offset.mismatch:.1f} deg)"
+    warn(f"has {keypoints_file.listed(people)}; took {person}{why}")
+    return person
 
 
 def _noisier(keypoints: Keypoints, sd: float, least: float) -> Keypoints:

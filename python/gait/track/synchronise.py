@@ -75,7 +75,7 @@ class Offset:
     certain: bool
 
 
-def synchronise(films: Sequence[Film[int]], other: Film[Id], given: float | None) -> tuple[Id, Offset, str]:
+def synchronise(films: Sequence[Film[Id]], other: Film[Id], given: float | None) -> tuple[Id, Offset, str]:
     """Find the person of the first film in another film, and the film's offset, with words that describe it.
 
     Parameters
@@ -106,7 +106,7 @@ def synchronise(films: Sequence[Film[int]], other: Film[Id], given: float | None
     return person, offset, _words(offset, given is not None)
 
 
-def same_person(first: Film[int], other: Film[Id], given: float | None) -> tuple[Id, Offset]:
+def same_person(first: Film[Id], other: Film[Id], given: float | None) -> tuple[Id, Offset]:
     """Find the person of the first film in another film: the one whose rays fit best, and the offset."""
     found: dict[Id, Offset] = {}
     person = first.people.get(first.person)
