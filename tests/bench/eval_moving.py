@@ -86,8 +86,8 @@ def main() -> int:
     note = (
         f"{facts()}\n\n"
         f"Simulated walks of {args.frames} frames, seeds {args.seeds}, {SIZE[0]} x {SIZE[1]}, from an "
-        "init file, without a detector. root, abs: medians over clips of the median over frames, with "
-        "the range in brackets. to still: relative to a still camera with that view. noisy: errors of "
+        "init file, without a detector. root, abs: medians over clips of the median over frames; from-to: "
+        "range of root over clips. to still: relative to a still camera with that view. noisy: errors of "
         f"{np.degrees(TURN_SD):.1f} degrees and {100 * PLACE_SD:.0f} cm, drawn anew for each frame; sd "
         "not given: without standard deviations in the file. follow: the camera is on a robot 1 m "
         f"behind. lost: frames with the status lost. Missed: {', '.join(missed) or 'none'}."
