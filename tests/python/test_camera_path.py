@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import ctypes
+import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from gait import Camera, UserError
+from gait.bindings import abi
 from gait.camera.path import CameraPath, CameraPose, one_place, stand_still, write_path
 from gait.cli import main
 
+ROOT = Path(__file__).resolve().parents[2]
 LEVEL = Camera.looking((0.0, -4.0, 1.5), (0.0, 0.0, 1.0), (320, 240), 300.0)
 TIMES = np.arange(6) / 10
 
@@ -37,6 +42,82 @@ def test_a_camera_between_two_poses_is_on_the_way(tmp_path):
     (found,) = CameraPath.read(str(tmp_path / "p.csv")).at_times([0.234])
     assert found.centre == pytest.approx(LEVEL.centre + [0.234, 0, 0])
     assert pytest.approx(LEVEL.R @ Rotation.from_rotvec([0, 0, -0.2 * 0.234]).as_matrix()) == found.R
+
+
+DAEMON = """
+#include "pose_path.c"
+bool message_set(message *m, const char *format, ...) { (void)m, (void)format; return false; }
+bool clock_check(int64_t utime, message *why) { (void)why; return utime >= 0; }
+bool at(const gait_camera *a, const gait_camera *b, int64_t apart, int64_t utime, gait_camera_pose *out)
+{
+    static pose_path path;
+    message why;
+    path = (pose_path){.count = 0};
+    return pose_path_add(&path, 0, a, &why) && pose_path_add(&path, apart, b, &why) &&
+           pose_path_at(&path, utime, out, &why) == POSE_KNOWN;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory):
+    """The daemon's pose at `utime`, between `a` at 0 and `b` at `apart`, microseconds; None: unknown."""
+    made = tmp_path_factory.mktemp("daemon") / "path.so"
+    words = ["cc", "-shared", "-fPIC", f"-I{ROOT}/tools/trackd", f"-I{ROOT}/libgait/include", "-o", made]
+    subprocess.run([*words, "-xc", "-", "-lm"], input=DAEMON, text=True, check=True)
+    at, lens = ctypes.CDLL(str(made)).at, LEVEL
+    at.restype = ctypes.c_bool
+
+    def pose(a: CameraPose, b: CameraPose, apart: int, utime: int) -> CameraPose | None:
+        ends = [
+            ctypes.byref(one.camera(lens).to_c()) for one in (a, b)
+        ]  # before CameraPoseC: loads the library
+        out = abi.CameraPoseC()
+        if not at(*ends, ctypes.c_int64(apart), ctypes.c_int64(utime), ctypes.byref(out)):
+            return None
+        return CameraPose(np.reshape(out.R, (3, 3)), np.array(out.t))
+
+    return pose
+
+
+def moved(metres: float, radians: float) -> CameraPose:
+    """The camera after a straight move and a rotation about an oblique axis."""
+    axis = np.array([2.0, -1.0, 2.0]) / 3
+    R = Rotation.from_rotvec(radians * axis).as_matrix() @ LEVEL.R
+    return CameraPose(R, -R @ (LEVEL.centre + metres * axis))
+
+
+@pytest.mark.parametrize("metres", [0.0, 0.3, 9.0])
+@pytest.mark.parametrize("radians", [0.0, 1e-4, 0.5, 3.1])
+def test_poses_between_are_those_of_the_daemon(daemon, metres, radians):
+    still, then = CameraPose.of(LEVEL), moved(metres, radians)
+    for utime in (1, 123_456, 249_999, 499_999):
+        (mine,) = CameraPath("p.csv", np.array([0.0, 0.5]), False, (still, then)).at_times([utime / 1e6])
+        its = daemon(still, then, 500_000, utime)
+        np.testing.assert_allclose(its.R, mine.R, atol=2e-6)
+        np.testing.assert_allclose(its.t, mine.t, atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "metres", "radians", "known"),
+    [
+        (0.499, 0, 0, True),
+        (0.501, 0, 0, False),
+        (0.1, 1.99, 0, True),
+        (0.1, 2.01, 0, False),
+        (0.1, 0, 1.99, True),
+        (0.1, 0, 2.01, False),
+    ],
+)
+def test_gaps_and_sudden_moves_are_those_of_the_daemon(daemon, seconds, metres, radians, known):
+    still, then = CameraPose.of(LEVEL), moved(metres, radians)
+    assert (daemon(still, then, round(1e6 * seconds), 50_000) is not None) == known
+    path = CameraPath("p.csv", np.array([0.0, seconds]), False, (still, then))
+    if known:
+        assert path.at_times([0.05])
+    else:
+        with pytest.raises(UserError, match="apart|jumps"):
+            path.at_times([0.05])
 
 
 def test_quaternions_of_a_robot_are_the_turn_from_camera_to_world(tmp_path):
