@@ -8,7 +8,9 @@
 #include "../../tools/trackd/service.h"
 
 #include "check.h"
+#include "toy_camera_message.h"
 #include "toy_model.h"
+#include "toy_written.h"
 
 static const gait_camera CAMERA = {48, 32, 50, 50, 24, 16, {1, 0, 0, 0, 0, -1, 0, 1, 0}, {0, 1, 5}, {0}};
 
@@ -135,10 +137,7 @@ static void test_same(void)
 static bool file(const char *text, gait_camera *out, message *why)
 {
     char name[] = P_tmpdir "/gait_cameras_XXXXXX";
-    int const made = mkstemp(name);
-    if (made < 0 || write(made, text, strlen(text)) != (ssize_t)strlen(text))
-        abort();
-    close(made);
+    toy_written(name, text, strlen(text));
     bool const ok = camera_file_read(name, out, why);
     CHECK(ok || strncmp(why->text, name, strlen(name)) == 0);
     unlink(name);
@@ -199,13 +198,11 @@ static void start(void)
     size_t bytes;
     message why;
     const void *const toy = toy_model_blob(&bytes);
-    int const file = mkstemp(name);
+    toy_written(name, toy, bytes);
     gait_tracker_default(&config, GAIT_MODE_DEFAULT);
     config.particles = config.acquisition_particles = 16;
-    if (write(file, toy, bytes) != (ssize_t)bytes || !tracking_open(&s.track, name, &config, &why) ||
-        !further_open(&more, "1,2", 0, &why))
+    if (!tracking_open(&s.track, name, &config, &why) || !further_open(&more, "1,2", 0, &why))
         abort();
-    close(file);
     unlink(name);
     s.further = &more;
     s.max_pixels = 3 * 48 * 32;
@@ -215,16 +212,7 @@ static void start(void)
 
 static void announce(further_camera *c, const gait_camera *camera, int64_t arrival)
 {
-    gaitmsg_camera_t msg = {.width = camera->width,
-                            .height = camera->height,
-                            .fx = (double)camera->fx,
-                            .fy = (double)camera->fy,
-                            .cx = (double)camera->cx,
-                            .cy = (double)camera->cy};
-    for (int i = 0; i < 9; i++)
-        msg.R[i] = (double)camera->R[i];
-    for (int i = 0; i < 3; i++)
-        msg.t[i] = (double)camera->t[i];
+    gaitmsg_camera_t const msg = toy_camera_message(camera, 0);
     service_camera(&s, c, &msg, arrival);
 }
 

@@ -8,6 +8,7 @@
 #include "gaitmsg_image_t.h"
 
 #include "check.h"
+#include "toy_camera_message.h"
 #include "toy_model.h"
 #include "toy_written.h"
 
@@ -65,17 +66,7 @@ static void end(void)
 
 static void announce(further_camera *c, const gait_camera *camera, int64_t utime)
 {
-    gaitmsg_camera_t msg = {.utime = utime,
-                            .width = camera->width,
-                            .height = camera->height,
-                            .fx = (double)camera->fx,
-                            .fy = (double)camera->fy,
-                            .cx = (double)camera->cx,
-                            .cy = (double)camera->cy};
-    for (int i = 0; i < 9; i++)
-        msg.R[i] = (double)camera->R[i];
-    for (int i = 0; i < 3; i++)
-        msg.t[i] = (double)camera->t[i];
+    gaitmsg_camera_t const msg = toy_camera_message(camera, utime);
     service_camera(&s, c, &msg, utime);
 }
 
