@@ -1,6 +1,7 @@
 """Cameras: projection and its inverse, every file format, every fault reported in one line."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -77,6 +78,19 @@ def test_projection_is_the_documented_formula():
     x, y, z = np.array(GOOD["R"]) @ [0.3, 2.0, 1.1] + GOOD["t"]
     np.testing.assert_allclose(view.project([0.3, 2.0, 1.1]), [700 * x / z + 321, 710 * y / z + 238.5])
     assert view.depth([0.3, 2.0, 1.1]) == pytest.approx(z)
+
+
+def test_slopes_are_the_change_of_the_pixels_by_place():
+    camera = replace(
+        Camera.looking((6.0, 5.0, 1.6), (0.3, 5.5, 0.9), (640, 480), 500.0),
+        distortion=(-0.2, 0.05, 1e-3, 2e-3),
+    )
+    points = np.random.default_rng(1).uniform((-1, 4, 0), (1, 7, 2), (2, 5, 3))
+    uv, slopes = camera.linearised(points)
+    np.testing.assert_allclose(uv, camera.project(points), atol=1e-9)
+    steps = 1e-5 * np.eye(3)
+    central = [(camera.project(points + step) - camera.project(points - step)) / 2e-5 for step in steps]
+    np.testing.assert_allclose(slopes, np.stack(central, axis=-1), rtol=1e-6, atol=1e-4)
 
 
 def test_points_behind_are_not_a_number_and_shapes_are_kept():

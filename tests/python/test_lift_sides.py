@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gait.body.skeleton import other_sides, side_pairs
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints import swaps
 from gait.lift.keypoints.swaps import SWAP_EVIDENCE, Reading, undo_swaps
@@ -183,3 +184,9 @@ def test_an_interval_is_judged_by_its_surroundings_without_outliers():
     for part in parts:
         assert part.frame[0] == 7 and abs(int(part.frame[-1]) - (40 + 30 + 7)) <= 1  # a second more
         assert np.isnan(part.uv[33, 0]).all() and np.isfinite(part.uv[32, 0]).all()
+
+
+def test_points_without_another_side_are_their_own():
+    names = ("r_hip", "neck", "l_hip", "l_knee", "l_ankle", "r_ankle")
+    assert other_sides(names) == [2, 1, 0, 3, 5, 4]
+    assert side_pairs(names) == [(2, 0), (4, 5)]

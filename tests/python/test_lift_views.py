@@ -196,6 +196,11 @@ VIEWS = ("--camera", "a.json", "--camera", "b.json")
             "b_late.csv: its camera is at the same place as that of b.csv; give each film and camera once",
         ),
         (
+            ("slow.csv", *VIEWS, "--offsets", "0"),
+            "slow.csv: its frames are 0.2 s apart; of several views only the first may have fewer than 7 a "
+            "second",
+        ),
+        (
             ("still.csv", *VIEWS),
             "still.csv: its time offset from a.csv cannot be estimated from the person's motion; give "
             "--offsets",
@@ -205,6 +210,7 @@ VIEWS = ("--camera", "a.json", "--camera", "b.json")
 def test_a_view_that_adds_nothing_is_refused(place, words, message, monkeypatch, capsys):
     monkeypatch.chdir(place)
     write("still.csv", walking.keypoints(SIDE, standing=True))
+    write("slow.csv", walking.keypoints(SIDE).part(slice(None, None, 3)))
     assert main(["lift", "a.csv", *words, "--keep-sides", "-o", "x.csv"]) == 1
     assert message in capsys.readouterr().err and not (place / "x.csv").exists()
 

@@ -9,7 +9,7 @@ radians; body axes are x forward, y left, z up.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -132,6 +132,19 @@ def default_skeleton(p: Proportions | None = None) -> Skeleton:
         limb_frames=np.array([[index[frame], shape] for frame, shape, _ in limbs.values()], np.int32),
         limb_shapes=np.array([numbers for _, _, numbers in limbs.values()], float),
     )
+
+
+def other_sides(names: Sequence[str]) -> list[int]:
+    """Columns of the points on the other side of the body; a point without one is its own."""
+    other = {"l_": "r_", "r_": "l_"}
+    twins = [other.get(name[:2], name[:2]) + name[2:] for name in names]
+    return [names.index(twin if twin in names else name) for twin, name in zip(twins, names, strict=True)]
+
+
+def side_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
+    """Columns of left and right of the points that have both."""
+    pairs = zip(range(len(names)), other_sides(names), strict=True)
+    return [(left, right) for left, right in pairs if names[left].startswith("l_") and left != right]
 
 
 def _mirror(v: tuple[float, float, float], side: str) -> tuple[float, float, float]:

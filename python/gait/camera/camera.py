@@ -132,6 +132,20 @@ class Camera:
             uv[front] = cv2.projectPoints(flat[front], rvec, self.t, self.matrix, self.distortion)[0][:, 0]
         return uv.reshape(*world.shape[:-1], 2)
 
+    def linearised(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Project, also behind the camera; also return slopes (..., 2, 3) by place, pixels per metre."""
+        with extras.importing("gait.Camera", "video"):
+            import cv2
+
+        world = np.asarray(points, np.float64)
+        rvec, _ = cv2.Rodrigues(self.R)
+        flat = np.ascontiguousarray(world.reshape(-1, 3))
+        uv, table = cv2.projectPoints(flat, rvec, self.t, self.matrix, np.asarray(self.distortion))
+        # a step of the point, rotated to the camera's axes, is a step of the translation
+        slopes = table[:, 3:6].reshape(-1, 2, 3) @ self.R
+        where = world.shape[:-1]
+        return np.asarray(uv, float).reshape(*where, 2), slopes.reshape(*where, 2, 3)
+
     def shows(self, points: ArrayLike) -> bool:
         """Whether any of the world points (..., 3) is in the picture."""
         uv = self.project(points)

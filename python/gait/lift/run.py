@@ -29,7 +29,7 @@ from gait.lift.view_sides import best_sides
 from gait.progress import progress
 from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
-from gait.track.synchronise import Film, no_shared_frame, same_person, synchronise
+from gait.track.synchronise import LONGEST_GAP_S, Film, no_shared_frame, same_person, synchronise
 
 #: Recordings; with two of one person, 90 % intervals for other people contained as little as 70 %.
 FEW_RECORDINGS = 4
@@ -244,6 +244,12 @@ def lift_views(
             people, _ = keypoints_file.read_people(path, prior.names, request.ignore_unknown, view.clip)
         person = _person(people, films, own, given, named)
         keypoints = people[person]
+        step = float(np.median(np.diff(keypoints.time))) if len(keypoints.time) > 1 else 0.0
+        if films and step >= LONGEST_GAP_S:
+            raise UserError(
+                f"{path}: its frames are {step:.2g} s apart; of several views only the first may have fewer "
+                f"than {np.ceil(1 / LONGEST_GAP_S):.0f} a second"
+            )
         one = prepare(path, keypoints, prior, own, named, quiet, sides_later=not request.keep_sides)
         assert isinstance(one.view, Perspective)
         sided = one.keypoints  # with left and right as this view alone shows them

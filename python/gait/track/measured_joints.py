@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints
+from gait.body.skeleton import other_sides
 from gait.camera.camera import Camera
 from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
@@ -34,8 +35,6 @@ Array = NDArray[np.float64]
 STUDENT_DEGREES = 4.0  # of freedom, of a keypoint's errors
 _ROUNDS = 4  # of robust weights and linearisation
 _USUAL = 0.04  # person's heights in the picture; usual distance of a keypoint from its joint
-_STEP = 1e-3  # metres, of a difference quotient
-_OTHER = {"l_": "r_", "r_": "l_"}
 _HIPS = ("l_hip", "r_hip")
 _LEAST_VIEWS = 2
 #: Seconds, sd of the weights over time: half as long as a detector's errors last.
@@ -148,8 +147,7 @@ def likelihood(joints: Array, sd: Array, views: Sequence[tuple[Camera, Array, Ar
     for _ in range(_ROUNDS):
         precision, pull = np.zeros((*joints.shape, 3)), np.zeros(joints.shape)
         for camera, uv, error in views:
-            expected, by_place = camera.project(joints + moves), slopes(camera, joints + moves)
-            off = uv - expected
+            off, by_place = uv - camera.project(joints + moves), camera.linearised(joints + moves)[1]
             square = (off**2).sum(axis=1) / error**2
             weight = np.nan_to_num((STUDENT_DEGREES + 2.0) / (STUDENT_DEGREES + square) / error**2)
             off = np.nan_to_num(off) + np.einsum("jax,jx->ja", by_place, moves)
@@ -164,17 +162,6 @@ def posterior(sd: Array, precision: Array, pull: Array) -> tuple[Array, Array]:
     whole = np.eye(3) / np.maximum(sd, 1e-6)[:, :, None] ** 2 + precision
     moves = np.linalg.solve(whole, pull[..., None])[..., 0]
     return moves, np.sqrt(np.linalg.inv(whole).diagonal(axis1=1, axis2=2))
-
-
-def slopes(camera: Camera, points: Array) -> Array:
-    """Change (..., 2, 3) of the pixels of points (..., 3) by their place, per metre."""
-    at = camera.project(points)
-    return np.stack([(camera.project(points + _STEP * way) - at) / _STEP for way in np.eye(3)], axis=-1)
-
-
-def other_sides(names: Sequence[str]) -> list[int]:
-    """Columns of the joints on the other side of the body; a joint without sides is its own."""
-    return [names.index(_OTHER.get(name[:2], name[:2]) + name[2:]) for name in names]
 
 
 def mistaken_sides(

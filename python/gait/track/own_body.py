@@ -24,13 +24,14 @@ from gait.bindings.model import Model, read_cyclic
 from gait.body import skeleton
 from gait.body.displaced import PARTS, displaced, effects
 from gait.body.model_curves import curves
+from gait.body.skeleton import other_sides
 from gait.camera.camera import Camera
 from gait.detect.profile import load, picture_height
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame
-from gait.track.measured_joints import STUDENT_DEGREES, mistaken_sides, other_sides, slopes
+from gait.track.measured_joints import STUDENT_DEGREES, mistaken_sides
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene
 
@@ -166,7 +167,7 @@ def _means(view: _View, joints: Array, J: Array) -> tuple[Array, Array, Array]:
     In shares of the person's height in the picture.
     """
     expected = view.camera.project(joints)
-    rows = np.einsum("tjab,tjbn->tjan", slopes(view.camera, joints), J)
+    rows = np.einsum("tjab,tjbn->tjan", view.camera.linearised(joints)[1], J)
     errors = view.uv - expected
     square = np.sum(errors**2, axis=2) / (view.sd**2 + (view.lasting * view.tall[:, None]) ** 2)
     weight = np.nan_to_num(1.0 / (view.sd**2 * (1.0 + square / STUDENT_DEGREES))) * view.tall[:, None]

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 _OVERLAP = 1.0  # least seconds that both films must show
 _SHARE = 0.3  # least share of the shorter film that both must show
 _MOST_FRAMES = 300  # most frames compared
-_LONGEST_GAP_S = 0.15  # seconds; joints are not interpolated across longer gaps
+LONGEST_GAP_S = 0.15  # seconds; keypoints are not interpolated across longer gaps
 _LEAST_SINE = 0.05  # of the angle between a ray and the direction to the other camera
 _OTHER_OFFSET_S = 0.2  # seconds; offsets further from the best count as others
 _CLEAR_RATIO = 1.25  # least ratio of any other offset's mismatch to the best one's
@@ -207,13 +207,35 @@ def _rays(keypoints: Keypoints, names: list[str], camera: Camera) -> Array:
     return np.asarray(np.where(visible[..., None], rays, np.nan))
 
 
+def neighbours(own: Array, times: Array) -> tuple[NDArray[np.intp], Array, NDArray[np.bool_]]:
+    """Find the frames of a film between which its keypoints are interpolated at other times.
+
+    Parameters
+    ----------
+    own : (T,)
+        Times of the film's frames, seconds; at least two.
+    times : (n,)
+        Seconds after the film began.
+
+    Returns
+    -------
+    after : (n,)
+        The later of the two frames; the other one is the frame before it.
+    share : (n,)
+        Weight of the later frame.
+    known : (n,)
+        Whether the time is between the two, which are less than `LONGEST_GAP_S` apart.
+    """
+    after = np.searchsorted(own, times).clip(1, len(own) - 1)
+    begin, end = own[after - 1], own[after]
+    share = (times - begin) / (end - begin)
+    share = np.where(np.abs(share) < 1e-6, 0.0, np.where(np.abs(share - 1) < 1e-6, 1.0, share))
+    return after, share, (share >= 0) & (share <= 1) & (end - begin < LONGEST_GAP_S)
+
+
 def _mismatch(planes: Array, times: Array, rays: Array, ray_times: Array, offset: float) -> float:
     """Compute the mismatch of an offset, degrees; NaN if too few rays can be compared."""
-    wanted = times - offset
-    after = np.searchsorted(ray_times, wanted).clip(1, len(ray_times) - 1)
-    begin, end = ray_times[after - 1], ray_times[after]
-    share = (wanted - begin) / (end - begin)
-    known = (share >= 0) & (share <= 1) & (end - begin < _LONGEST_GAP_S)
+    after, share, known = neighbours(ray_times, times - offset)
     between = rays[after - 1] + share[:, None, None] * (rays[after] - rays[after - 1])
     sine = (planes * between).sum(axis=-1)[known]
     if np.isfinite(sine).sum() < _SHARE / 3 * planes.shape[1] * len(times):

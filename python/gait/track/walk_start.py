@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gait.bindings.model import Model
 from gait.bindings.start_fit import Hypothesis, StartFit
+from gait.body.skeleton import other_sides
 from gait.camera.camera import Camera
 from gait.detect.profile import picture_height
 from gait.errors import GaitError
@@ -108,9 +109,7 @@ def choose_frames(keypoints: Keypoints) -> Keypoints:
 
 def swap_sides(keypoints: Keypoints, rows: NDArray[np.bool_] | None = None) -> Keypoints:
     """Swap left and right, in all frames or in those of `rows` (T,)."""
-    names = keypoints.names
-    other = {name: {"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:] for name in names}
-    columns = [names.index(other[name]) if other[name] in names else k for k, name in enumerate(names)]
+    columns = other_sides(keypoints.names)
     chosen = np.ones(len(keypoints.time), bool) if rows is None else rows
     return replace(
         keypoints,

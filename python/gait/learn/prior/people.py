@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from gait.body.model_curves import pace, series, waves
-from gait.body.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
+from gait.body.skeleton import CHANNELS, Proportions, default_skeleton, other_sides, points
 from gait.errors import UserError
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, release, stored
 from gait.learn.cycles.fourier import CYCLE_HARMONICS, decode, encode, fourier_basis
@@ -53,12 +53,8 @@ STEEPEST_SLOPE = 1.0
 
 def mirrored(rows: Floats) -> Floats:
     """Mirror cycles (R, T, M): left and right swapped, half a cycle later."""
-    order, sign = [], []
-    for name in CHANNELS:
-        twin = f"{SIDES[1 - SIDES.index(name[0])]}{name[1:]}" if name[:2] in ("l_", "r_") else name
-        order.append(CHANNELS.index(twin))
-        sign.append(-1.0 if name in AGAINST else 1.0)
-    return np.roll(rows[:, :, order] * sign, rows.shape[1] // 2, axis=1)
+    sign = [-1.0 if name in AGAINST else 1.0 for name in CHANNELS]
+    return np.roll(rows[:, :, other_sides(CHANNELS)] * sign, rows.shape[1] // 2, axis=1)
 
 
 def joint_metric(mean: Floats, proportions: Proportions) -> Floats:

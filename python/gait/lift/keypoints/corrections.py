@@ -26,6 +26,7 @@ import numpy.typing as npt
 
 from gait.bindings.abi import MAX_PIXELS
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import side_pairs
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
@@ -272,7 +273,7 @@ def corrected(keypoints: Keypoints, edits: Edits, sd: float) -> Keypoints:
     uv, confidence = found.uv.copy(), found.confidence.copy()
     for swap in edits.swapped:
         rows = _rows(found, swap.first, swap.last)[:, None]
-        for left, right in _pairs(found.names):
+        for left, right in side_pairs(found.names):
             both = np.array([left, right])
             for values in (uv, confidence):
                 values[rows, both] = values[rows, both[::-1]]
@@ -317,12 +318,6 @@ def found_alike(names: Sequence[str], joint: str) -> list[int]:
 
 def _rows(keypoints: Keypoints, first: int, last: int) -> npt.NDArray[np.intp]:
     return np.flatnonzero((keypoints.frame >= first) & (keypoints.frame <= last))
-
-
-def _pairs(names: Sequence[str]) -> list[tuple[int, int]]:
-    """List the columns of left and right points."""
-    both = [n for n in names if n.startswith("l_") and f"r_{n[2:]}" in names]
-    return [(names.index(n), names.index(f"r_{n[2:]}")) for n in both]
 
 
 def _with_points(keypoints: Keypoints, joints: Sequence[str]) -> Keypoints:

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.io.keypoints_file import Keypoints
+from gait.track.synchronise import neighbours
 
 Array = NDArray[np.float64]
-
-_GAP = 0.15  # seconds; points are not interpolated across longer gaps
 
 
 def joined(views: Sequence[Keypoints], offsets: Sequence[float]) -> tuple[Keypoints, NDArray[np.intp]]:
@@ -67,11 +66,7 @@ def _stacked(columns: Sequence[Array | None], views: Sequence[Keypoints]) -> Arr
 
 def _at(keypoints: Keypoints, times: Array) -> Keypoints:
     """Interpolate keypoints at other times (T,), seconds of their film."""
-    after = np.searchsorted(keypoints.time, times).clip(1, len(keypoints.time) - 1)
-    begin, end = keypoints.time[after - 1], keypoints.time[after]
-    share = (times - begin) / (end - begin)
-    share = np.where(np.abs(share) < 1e-6, 0.0, np.where(np.abs(share - 1) < 1e-6, 1.0, share))
-    known = (share >= 0) & (share <= 1) & (end - begin < _GAP)
+    after, share, known = neighbours(keypoints.time, times)
 
     def between(values: Array) -> Array:
         weight = share.reshape(-1, *[1] * (values.ndim - 1))

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import side_pairs
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints import noise
 
@@ -291,12 +292,9 @@ def share_suspected(keypoints: Keypoints, sd: float) -> float:
 
 def _paired(keypoints: Keypoints) -> tuple[list[str], Ints]:
     """Joints that have both sides, and their columns (P, 2); none if frames are too few or too far apart."""
-    joints = [
-        name[2:] for name in keypoints.names if name.startswith("l_") and f"r_{name[2:]}" in keypoints.names
-    ]
-    if len(keypoints.time) < 3 or np.median(np.diff(keypoints.time)) > SLOWEST:
-        joints = []
-    columns = [[keypoints.names.index(f"{side}_{joint}") for side in "lr"] for joint in joints]
+    slow = len(keypoints.time) < 3 or np.median(np.diff(keypoints.time)) > SLOWEST
+    columns = [] if slow else side_pairs(keypoints.names)
+    joints = [keypoints.names[left][2:] for left, _ in columns]
     return joints, np.array(columns, np.intp).reshape(-1, 2)
 
 

@@ -212,14 +212,7 @@ class CameraView:
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
         """Pixels and slopes, see `View`."""
-        turn, _ = cv2.Rodrigues(self.camera.R)
-        flat = np.ascontiguousarray(points.reshape(-1, 3))
-        uv, table = cv2.projectPoints(
-            flat, turn, self.camera.t, self.camera.matrix, np.asarray(self.camera.distortion)
-        )
-        # a step of the point, rotated to the camera's axes, is a step of the translation
-        slope = table[:, 3:6].reshape(-1, 2, 3) @ self.camera.R
-        return np.asarray(uv, float).reshape(*points.shape[:-1], 2), slope.reshape(*points.shape[:-1], 2, 3)
+        return self.camera.linearised(points)
 
     def visible(self, points: Floats) -> bool:
         """Whether all points are in front of the lens."""
