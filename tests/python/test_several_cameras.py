@@ -5,6 +5,7 @@ import threading
 from dataclasses import replace
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -22,11 +23,14 @@ from gait.simulate.stage import set_stage
 from gait.track import scene
 from gait.track.further_cameras import SeveralVideos
 from gait.track.person_keypoints import PersonKeypoints
-from gait.track.synchronise import find_offset
+from gait.track.silhouette_offset import Filmed, silhouette_offset
+from gait.track.synchronise import Film, find_offset, synchronise
 
 FRAMES, FPS = 30, 30.0
 SCENARIO = replace(PRESETS["toward"], frames=FRAMES, size=(160, 120), cameras=2)
 JOINTS = (
+    "l_shoulder",
+    "r_shoulder",
     "l_hip",
     "r_hip",
     "l_knee",
@@ -73,6 +77,58 @@ def test_a_person_who_stands_does_not_give_the_time(stage):
     ours, theirs = (keypoints(stage, camera, range(60), stands=True) for camera in (first, second))
     assert not find_offset(ours, first, theirs, second).certain
     assert find_offset(ours, first, theirs, second, given=0.2).seconds == 0.2
+
+
+class _Drawing(Video):
+    """Frames without a file, of a body made of spheres."""
+
+    def __init__(self, stage, camera, frames, bottom=480):
+        points = stage.walk.points(stage.frames[list(frames)])
+        self.places = np.stack([points[name] for name in (*JOINTS, "neck", "head_top")], axis=1)
+        self.camera, self.bottom = camera, bottom
+        noise = np.random.default_rng(int(camera.fx))
+        self.wall = noise.integers(90, 130, (480, 640, 1), np.uint8).repeat(3, axis=2)
+
+    def frames(self, start=0, stop=None, *, grey=False):
+        for number in range(len(self.places))[start:stop]:
+            image = self.wall.copy()
+            pixels, depth = self.camera.project(self.places[number]), self.camera.depth(self.places[number])
+            for (u, v), away in zip(pixels, depth, strict=True):
+                middle = int(round(16 * u)), int(round(16 * v))
+                cv2.circle(image, middle, int(16 * 0.07 * self.camera.fx / away), (20, 20, 20), -1, shift=4)
+            for (u, v), (x, y) in zip(pixels[:-1], pixels[1:], strict=True):
+                cv2.line(image, (int(u), int(v)), (int(x), int(y)), (20, 20, 20), 5)
+            image[self.bottom :] = self.wall[self.bottom :]
+            yield Frame(number, number / FPS, image)
+
+    def pick(self, wanted, progress=None):
+        return (frame for frame in self.frames() if frame.number in wanted)
+
+
+def _filmed(stage, camera, frames, **options):
+    return Filmed(_Drawing(stage, camera, frames, **options), camera, keypoints(stage, camera, frames))
+
+
+def test_silhouettes_show_the_offset_more_exactly_than_joints(stage):
+    first, other = _filmed(stage, stage.camera, range(90)), _filmed(stage, stage.beside[0], range(11, 90))
+    late = 11 / FPS
+    assert silhouette_offset(first, other, late + 0.03) == pytest.approx(late, abs=0.003)
+    assert silhouette_offset(other, first, -late - 0.04) == pytest.approx(-late, abs=0.003)
+    assert silhouette_offset(first, other, late + 0.25) is None  # too far away for the search
+    films = [Film("film", one.camera, {0: one.keypoints}, 0, one.video) for one in (first, other)]
+    _, offset, words = synchronise(films[:1], films[1], None)
+    assert offset.seconds == pytest.approx(late, abs=0.003)
+    assert "s after the first film, estimated from the person's silhouette" in words
+    _, offset, words = synchronise(films[:1], replace(films[1], video=None), None)
+    assert offset.source == "motion" and "estimated from the person's motion" in words
+
+
+def test_silhouettes_that_do_not_show_the_offset_are_not_used(stage):
+    first = _filmed(stage, stage.camera, range(90))
+    standing = _filmed(stage, stage.beside[0], [40] * 60)
+    assert silhouette_offset(first, standing, 0.4) is None
+    away = _filmed(stage, stage.beside[0], range(11, 90), bottom=0)
+    assert silhouette_offset(first, away, 11 / FPS) is None
 
 
 class _Film(Video):

@@ -424,7 +424,7 @@ def _filmed(
         if views and _is_video(path, False):
             found = _detect(args, prior, path, camera)
         people = {str(id): one for id, one in found.people.items()} if found else None
-        views.append(FilmedView(path, camera, people, clip))
+        views.append(FilmedView(path, camera, people, clip, found.still if found else None))
     return views
 
 

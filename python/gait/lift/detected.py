@@ -67,11 +67,14 @@ class Detected:
         The camera, if it was estimated.
     turns : CameraTurns, optional
         How the camera turns; None if it is static or turns are not to be undone.
+    still : Video, optional
+        The film, if its camera stands still.
     """
 
     people: Mapping[int, Keypoints]
     calibration: Calibration | None = None
     turns: CameraTurns | None = None
+    still: Video | None = None
 
     @property
     def keypoints(self) -> Keypoints:
@@ -95,17 +98,20 @@ def find_keypoints(request: Request, prior: SegmentPrior, quiet: bool) -> Detect
     if request.corrections:
         read_edits(request.corrections, prior, video.span(request.start or 0, request.stop), video.size)
     people = find_people(video, quiet, request.start or 0, request.stop)
-    turns, samples, camera = None, sample_frames(video), given or expected_camera(video, request.fov)
+    turns, samples = None, sample_frames(video)
+    turn: float | None = 0.0
+    camera = given or expected_camera(video, request.fov)
     if request.stabilize:
         turns = find_turns(video, camera, samples, people, None, quiet, first=given is not None)
     elif (turn := turn_in_samples(camera, samples, people)) != 0:
         note(f"the camera {in_words(turn)} and counts as still: --stabilize auto estimates its turns", quiet)
     if turns is not None:
         people = {id: turns.in_reference(keypoints) for id, keypoints in people.items()}
+    still = video if turns is None and turn == 0 else None
     if request.camera or request.parallel:
-        return Detected(people, None, turns)
+        return Detected(people, None, turns, still)
     id, calibration = _calibrate(request, video, people, quiet)
-    return Detected({id: people[id]}, calibration, turns)
+    return Detected({id: people[id]}, calibration, turns, still)
 
 
 def find_camera(request: Request, prior: SegmentPrior, quiet: bool) -> Calibration:

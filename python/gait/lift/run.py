@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ from gait.progress import progress
 from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
 from gait.track.synchronise import LONGEST_GAP_S, Film, no_shared_frame, same_person, synchronise
+
+if TYPE_CHECKING:  # imports PyAV, not needed for files of keypoints
+    from gait.io.video import Video
 
 #: Recordings; with two of one person, 90 % intervals for other people contained as little as 70 %.
 FEW_RECORDINGS = 4
@@ -112,12 +115,15 @@ class FilmedView:
         Those found in the film, the person seen most first; None to read them from `path`.
     clip : Clip
         What a keypoint file of another tool may lack, as in `Request`.
+    video : Video, optional
+        The film, if its camera stands still.
     """
 
     path: str
     camera: str
     people: Mapping[str, Keypoints] | None = None
     clip: Clip = Clip()
+    video: Video | None = None
 
 
 @dataclass(frozen=True)
@@ -256,7 +262,7 @@ def lift_views(
         if offsets is None and not request.keep_sides:
             with suppress(UserError):  # too little may be visible in one view
                 sided = prepare(path, keypoints, prior, own, lambda _: None, quiet).keypoints
-        film = Film(path, one.view.camera, {person: sided}, person)
+        film = Film(path, one.view.camera, {person: sided}, person, view.video)
         if films:
             _, offset, words = synchronise(films, film, given)
             began.append(offset.seconds)

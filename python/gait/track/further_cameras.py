@@ -125,4 +125,5 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
 
 
 def _film(scene: Scene) -> Film[int]:
-    return Film(str(scene.video.path), scene.camera, scene.people, scene.person)
+    video = None if scene.poses or scene.moved else scene.video
+    return Film(str(scene.video.path), scene.camera, scene.people, scene.person, video)

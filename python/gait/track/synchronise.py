@@ -1,16 +1,19 @@
-"""Time offset between two films of a walk, from the joints detected in both, or as given.
+"""Time offset between two films of a walk, from the person's motion in both, or as given.
 
 The rays along which two cameras see a joint at the same time intersect: the second lies in the plane through
 both cameras and the first ray (the epipolar constraint).  If the films are shifted in time, joints that move
 across these planes are off them.  Errors of the detector and the camera files last, so the mismatch contains
 both the distances of rays from the planes and the changes of these distances from each joint's average.
+
+The detector's errors differ between views and repeat in each stride, so this offset is off by about half a
+frame.  If the cameras stand still, silhouettes in the films improve it (`gait.track.silhouette_offset`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +21,9 @@ from numpy.typing import NDArray
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
+
+if TYPE_CHECKING:  # imports PyAV, not needed for files of keypoints
+    from gait.io.video import Video
 
 Array = NDArray[np.float64]
 
@@ -31,6 +37,7 @@ _CLEAR_RATIO = 1.25  # least ratio of any other offset's mismatch to the best on
 _SAME_PLACE_M = 0.01  # metres between two cameras; from nearer by, their rays give no distance
 _FINE = 10  # steps per frame of the final search
 _TOGETHER = 1.1  # films began together if that has up to this times the best mismatch, a frame away
+_TOGETHER_S = 0.005  # seconds; films that began less apart began together
 
 
 Id = TypeVar("Id", int, str)
@@ -48,12 +55,15 @@ class Film(Generic[Id]):
         The people seen in it.
     person : id
         The one who is tracked or lifted; of a further film, if the motion does not show who that is.
+    video : Video, optional
+        Its pictures, if its camera stands still.
     """
 
     path: str
     camera: Camera
     people: Mapping[Id, Keypoints]
     person: Id
+    video: Video | None = None
 
 
 @dataclass(frozen=True)
@@ -68,11 +78,14 @@ class Offset:
         Angle between rays and epipolar planes, degrees.
     certain : bool
         Whether all other offsets fit clearly worse.
+    source : str
+        What showed it: the person's ``motion``, or their ``silhouette``, then to some milliseconds.
     """
 
     seconds: float
     mismatch: float
     certain: bool
+    source: str = "motion"
 
 
 def synchronise(films: Sequence[Film[Id]], other: Film[Id], given: float | None) -> tuple[Id, Offset, str]:
@@ -103,7 +116,28 @@ def synchronise(films: Sequence[Film[Id]], other: Film[Id], given: float | None)
             f"{other.path}: its time offset from {first.path} cannot be estimated from the person's motion; "
             "give --offsets, the seconds by which each further film began later, and check the cameras"
         )
+    if given is None:
+        offset = _improved(offset, first, other, person)
     return person, offset, _words(offset, given is not None)
+
+
+def _improved(offset: Offset, first: Film[Id], other: Film[Id], person: Id) -> Offset:
+    """Return the offset by the silhouettes if the films' pictures show it, otherwise `offset`."""
+    if first.video is None or other.video is None:
+        return offset
+    from gait.track.silhouette_offset import Filmed, silhouette_offset  # here, as it loads OpenCV
+
+    ours, theirs = first.people[first.person], other.people[person]
+    seconds = silhouette_offset(
+        Filmed(first.video, first.camera, ours), Filmed(other.video, other.camera, theirs), offset.seconds
+    )
+    if seconds is None:
+        return offset
+    seconds = 0.0 if abs(seconds) < _TOGETHER_S else seconds
+    joints = find_offset(ours, first.camera, theirs, other.camera, seconds)
+    return replace(
+        offset, seconds=seconds, mismatch=np.nan if joints is None else joints.mismatch, source="silhouette"
+    )
 
 
 def same_person(first: Film[Id], other: Film[Id], given: float | None) -> tuple[Id, Offset]:
@@ -126,7 +160,7 @@ def _words(offset: Offset, given: bool) -> str:
     when = "together with the first film"
     if offset.seconds != 0:
         when = f"{abs(offset.seconds):.3f} s {'after' if offset.seconds > 0 else 'before'} the first film"
-    how = "as given" if given else "estimated from the person's motion"
+    how = "as given" if given else f"estimated from the person's {offset.source}"
     fit = "" if np.isnan(offset.mismatch) else f" (joints fit to {offset.mismatch:.1f} deg)"
     return f"began {when}, {how}{fit}"
 
