@@ -48,7 +48,9 @@ CAMERA = Camera(
     R=np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
     t=np.array([0.0, 1.0, 4.0]),
 )
-SD = State(phase=0.02, stride_hz=0.02, stature=0.02, heading=0.05, pelvis=np.full(3, 0.03))
+SD = State(
+    phase=0.02, stride_hz=0.02, stature=0.02, heading=0.05, pelvis=np.full(3, 0.03), turn_rate=0.25
+)  # of the turn rate as in the prior, because messages do not state it
 
 
 @cache

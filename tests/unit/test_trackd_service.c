@@ -157,6 +157,7 @@ static void test_commands(void)
     CHECK(!s.seek && text("waiting for START"));
     start(&s, 100);
     CHECK(s.state == GAITMSG_STATUS_T_ARMED && s.seek);
+    CHECK(s.start.sd.turn_rate > 0.0f && s.start.sd.turn_rate == s.track.prior_sd.turn_rate);
     c.command = GAITMSG_COMMAND_T_RESET;
     service_command(&s, &c);
     CHECK(s.state == GAITMSG_STATUS_T_READY && text("waiting for the background"));

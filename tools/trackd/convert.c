@@ -34,7 +34,7 @@ bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown,
         return message_set(why, "state with ncoef %d; give 0 to %d", in->ncoef, GAIT_MAX_COMPONENTS);
     if (in->noffset < 0 || in->noffset > GAIT_MAX_ANGLES)
         return message_set(why, "state with noffset %d; give 0 to %d", in->noffset, GAIT_MAX_ANGLES);
-    *out = (gait_state){0};
+    *out = (gait_state){.turn_rate = unknown->turn_rate}; /* messages do not state it */
 #define TAKE(name) out->name = known(in->name, unknown->name);
     SCALARS(TAKE)
     for (int i = 0; i < 3; i++)
