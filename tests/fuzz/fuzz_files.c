@@ -12,8 +12,9 @@ enum { CAMERA, INIT, SETTINGS, BACKGROUND, SNAPSHOT, JPEG, KINDS };
 /* A service whose tracker has followed its person for some frames. */
 static service *running(const memory_file *file)
 {
-    static service s;
     static sink out;
+    static service_shared shared = {.out = &out, .threads = 1};
+    static service s = {.shared = &shared};
     size_t bytes;
     message why;
     gait_state mean, sd;
@@ -23,13 +24,12 @@ static service *running(const memory_file *file)
     gait_camera const camera = fuzz_camera();
     const void *const toy = toy_model_blob(&bytes);
     memory_file_write(file, toy, bytes);
-    s.max_gap = 2;
-    s.max_pixels = FUZZ_WIDTH * FUZZ_HEIGHT;
+    shared.max_gap = 2;
+    shared.max_pixels = FUZZ_WIDTH * FUZZ_HEIGHT;
     gait_tracker_prior(toy_model(), &mean, &sd, NULL);
-    camera_use(&s.slot, &camera);
-    if (!tracking_open(&s.track, file->path, &config, &why) ||
-        !service_open(&s, &out, 0, 1, NULL, false, &why) || !service_make_trackers(&s, &why) ||
-        !tracking_start(&s.track, &mean, &sd, 0, &why))
+    camera_use(&shared.slot, &camera);
+    if (!tracking_open(&s.track, file->path, &config, &why) || !service_open(&s, NULL, false, &why) ||
+        !service_make_trackers(&s, &why) || !tracking_start(&s.track, &mean, &sd, 0, &why))
         abort();
     fuzz_steps(s.track.tracker, 0, 2, 1);
     return &s;

@@ -38,21 +38,21 @@ static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *
     }
     if (choice & 2) {
         ok = ok && lift_service_open(lift, segments.path, &set, out, &why);
-        s->lift = lift;
+        s->shared->lift = lift;
     } else if (choice & 4)
-        s->path = path;
+        s->shared->path = path;
     if (choice & 16 && further_open(more, "1", 0, &why)) {
-        s->further = more;
-        more->camera[0].path = s->path ? more_path : NULL;
+        s->shared->further = more;
+        more->camera[0].path = s->shared->path ? more_path : NULL;
     }
-    s->max_gap = 2;
-    s->max_pixels = 2 * FUZZ_WIDTH * FUZZ_HEIGHT;
-    ok = ok && service_open(s, out, 0, 1, NULL, choice & 8, &why);
-    if (choice & 64 && s->cue && !s->lift && !s->further) {
+    s->shared->max_gap = 2;
+    s->shared->max_pixels = 2 * FUZZ_WIDTH * FUZZ_HEIGHT;
+    ok = ok && service_open(s, NULL, choice & 8, &why);
+    if (choice & 64 && s->cue && !s->shared->lift && !s->shared->further) {
         keypoint_cue_open(second_cue, s->track.model, s->track.info.joints, 4);
         s->person = 1;
         service_share(second, s, 2, second_cue);
-        ok = ok && service_open(second, out, 0, 1, NULL, choice & 8, &why);
+        ok = ok && service_open(second, NULL, choice & 8, &why);
     }
     if (!ok)
         abort();
@@ -60,6 +60,7 @@ static void start(service *s, lift_service *lift, keypoint_cue *cue, pose_path *
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
+    static service_shared shared;
     static service s, second;
     static lift_service lift;
     static keypoint_cue cue, second_cue;
@@ -86,7 +87,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fuzz_bytes b = {data, size};
     sink out = {0};
     snapshot_file snapshot = {0};
-    s = second = (service){0};
+    shared = (service_shared){.out = &out, .threads = 1};
+    s = second = (service){.shared = &shared};
     lift = (lift_service){0};
     cue = (keypoint_cue){0};
     path = more_path = (pose_path){.turn_sd = 0.01f, .place_sd = 0.01f};
@@ -97,7 +99,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         uint8_t const kind = fuzz_take(&b);
         size_t const stated = (size_t)(fuzz_take(&b) << 8 | fuzz_take(&b)),
                      n = stated < b.left ? stated : b.left;
-        bool const is_further = s.further && kind & 64;
+        bool const is_further = shared.further && kind & 64;
         struct handler const h = is_further ? of_further[kind % FURTHER] : handlers[kind % 8 % HANDLERS];
         int64_t const type = h.type();
         uint8_t *const message_bytes =
@@ -118,11 +120,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             service_send_status(each);
     }
     flush_held(&r);
-    if (s.lift)
-        lift_service_close(s.lift);
+    if (shared.lift)
+        lift_service_close(shared.lift);
     if (s.next)
         service_close(s.next);
     service_close(&s);
+    service_shared_close(&shared);
     further_close(&more);
     return 0;
 }

@@ -187,7 +187,8 @@ static void test_files(void)
 }
 
 /* ---- a service with a further camera ---- */
-static service s;
+static service_shared shared;
+static service s = {.shared = &shared};
 static further more;
 
 static void start(void)
@@ -204,9 +205,10 @@ static void start(void)
     if (!tracking_open(&s.track, name, &config, &why) || !further_open(&more, "1,2", 0, &why))
         abort();
     unlink(name);
-    s.further = &more;
-    s.max_pixels = 3 * 48 * 32;
-    if (!service_open(&s, &out, 0, 1, NULL, false, &why))
+    shared.out = &out;
+    shared.further = &more;
+    shared.max_pixels = 3 * 48 * 32;
+    if (!service_open(&s, NULL, false, &why))
         abort();
 }
 
@@ -229,8 +231,8 @@ static void test_further(void)
     announce(&more.camera[1], &CAMERA, 1);
     CHECK(s.track.tracker && s.track.config.cameras == 3 && s.state == GAITMSG_STATUS_T_READY);
     size_t const bytes = s.track.memory_bytes;
-    CHECK(bytes == s.track.model_bytes + s.track.tracker_bytes + s.track.picture_bytes + s.hold.capacity +
-                       more.camera[0].bytes + more.camera[1].bytes);
+    CHECK(bytes == s.track.model_bytes + s.track.tracker_bytes + s.track.picture_bytes +
+                       shared.hold.capacity + more.camera[0].bytes + more.camera[1].bytes);
     s.state = GAITMSG_STATUS_T_RUNNING;
     announce(&more.camera[0], &CAMERA, 2);
     CHECK(s.state == GAITMSG_STATUS_T_RUNNING && strstr(s.text.text, "after 10 seconds"));
@@ -250,6 +252,7 @@ int main(void)
     start();
     test_further();
     service_close(&s);
+    service_shared_close(&shared);
     further_close(&more);
     return CHECK_DONE();
 }

@@ -70,6 +70,7 @@ static char model[] = P_tmpdir "/gait_memory_XXXXXX", segments[] = P_tmpdir "/ga
 static message why;
 
 static struct parts {
+    service_shared shared;
     service s, second;
     lift_service lift;
     further more;
@@ -86,19 +87,21 @@ static bool open_all(void)
     lift_settings const set = {.sd = 3, .lag = 2, .cpu_mask = ~0u};
     gait_tracker_default(&config, GAIT_MODE_DEFAULT);
     config.particles = config.acquisition_particles = 16;
-    p = (struct parts){.s.lift = &p.lift, .s.further = &p.more, .s.person = 1, .s.max_pixels = 2 * 48 * 32};
+    p = (struct parts){
+        .shared = {.out = &out, .lift = &p.lift, .further = &p.more, .max_pixels = 2 * 48 * 32},
+        .s = {.shared = &p.shared, .person = 1}};
     if (!workers_start(&p.pool, 2, &why) || !tracking_open(&p.s.track, model, &config, &why) ||
         !lift_service_open(&p.lift, segments, &set, &out, &why) || !further_open(&p.more, "1", 0, &why))
         return false;
     keypoint_cue_open(&p.cue, p.s.track.model, p.s.track.info.joints, 4);
     keypoint_cue_open(&p.second_cue, p.s.track.model, p.s.track.info.joints, 4);
     p.s.cue = &p.cue;
-    if (!service_open(&p.s, &out, 0, 2, NULL, true, &why))
+    if (!service_open(&p.s, NULL, true, &why))
         return false;
     service_share(&p.second, &p.s, 2, &p.second_cue);
-    camera_use(&p.s.slot, &CAMERA);
+    camera_use(&p.shared.slot, &CAMERA);
     camera_use(&p.more.camera[0].slot, &CAMERA);
-    if (!service_open(&p.second, &out, 0, 2, NULL, true, &why) || !further_allocate(&p.more.camera[0], &why))
+    if (!service_open(&p.second, NULL, true, &why) || !further_allocate(&p.more.camera[0], &why))
         return false;
     p.complete = true;
     return service_make_trackers(&p.s, &why);
@@ -108,6 +111,7 @@ static void close_all(void)
 {
     service_close(&p.second);
     service_close(&p.s);
+    service_shared_close(&p.shared);
     lift_service_close(&p.lift);
     further_close(&p.more);
     workers_stop(&p.pool);
@@ -116,7 +120,7 @@ static void close_all(void)
 static void test_every_allocation(void)
 {
     allocations = fail_at = 0;
-    CHECK(open_all() && p.second.track.tracker && p.s.hold.frame);
+    CHECK(open_all() && p.second.track.tracker && p.shared.hold.frame);
     close_all();
     int const all = allocations;
     CHECK(all > 15);
@@ -124,7 +128,7 @@ static void test_every_allocation(void)
         allocations = 0;
         why.text[0] = '\0';
         CHECK(!open_all() && strstr(why.text, "not enough memory"));
-        CHECK(!p.complete || !p.s.slot.known); /* the camera has to be announced again */
+        CHECK(!p.complete || !p.shared.slot.known); /* the camera has to be announced again */
         close_all();
     }
     fail_at = 0;

@@ -86,7 +86,8 @@ static int layer_poll(struct pollfd *fd, nfds_t count, const struct timespec *wa
 #include "toy_written.h"
 
 static char model[] = P_tmpdir "/gait_receiver_XXXXXX";
-static service s, second;
+static service_shared shared;
+static service s = {.shared = &shared}, second;
 static keypoint_cue cue, second_cue;
 static further more;
 static snapshot_file snapshot;
@@ -100,17 +101,18 @@ static void start(void)
     gait_tracker_config config;
     gait_tracker_default(&config, GAIT_MODE_DEFAULT);
     config.particles = config.acquisition_particles = 16;
-    s.max_pixels = 48 * 32;
+    shared.out = &out;
+    shared.max_pixels = 48 * 32;
     s.person = 1;
-    s.further = &more;
+    shared.further = &more;
     s.cue = &cue;
     if (!tracking_open(&s.track, model, &config, &why) || !further_open(&more, "3", 0, &why) ||
-        !service_open(&s, &out, 0, 1, NULL, false, &why))
+        !service_open(&s, NULL, false, &why))
         abort();
     keypoint_cue_open(&cue, s.track.model, s.track.info.joints, 4);
     keypoint_cue_open(&second_cue, s.track.model, s.track.info.joints, 4);
     service_share(&second, &s, 2, &second_cue);
-    if (!service_open(&second, &out, 0, 1, NULL, false, &why))
+    if (!service_open(&second, NULL, false, &why))
         abort();
 }
 
@@ -241,6 +243,7 @@ int main(void)
     test_channels();
     service_close(&second);
     service_close(&s);
+    service_shared_close(&shared);
     further_close(&more);
     unlink(model);
     return CHECK_DONE();

@@ -20,6 +20,7 @@ static const gait_camera CAMERA = {WIDTH,     HEIGHT, 50, 50, 24, 16, {1, 0, 0, 
 static char model[] = P_tmpdir "/gait_service_XXXXXX";
 static uint8_t pixels[3 * WIDTH * HEIGHT], other[3 * WIDTH * HEIGHT];
 static service s, second, third;
+static service_shared shared;
 static keypoint_cue cue[3];
 static pose_path path;
 static further more;
@@ -32,23 +33,23 @@ static void begin(pose_path *with_path, further *with_further, bool people)
     message why;
     gait_tracker_default(&config, GAIT_MODE_DEFAULT);
     config.particles = config.acquisition_particles = 16;
-    s = second = third = (service){0};
+    s = second = third = (service){.shared = &shared};
+    shared = (service_shared){.out = &out, .threads = 1};
     path = (pose_path){.turn_sd = 0.01f, .place_sd = 0.01f};
-    s.max_pixels = 2 * WIDTH * HEIGHT;
-    s.max_gap = 2;
-    s.path = with_path;
-    s.further = with_further;
+    shared.max_pixels = 2 * WIDTH * HEIGHT;
+    shared.max_gap = 2;
+    shared.path = with_path;
+    shared.further = with_further;
     bool ok = tracking_open(&s.track, model, &config, &why) && further_open(&more, "1", 0, &why);
     for (int i = 0; i < 3 && people; i++)
         keypoint_cue_open(&cue[i], s.track.model, s.track.info.joints, 4);
     s.cue = people ? &cue[0] : NULL;
     s.person = people;
-    ok = ok && service_open(&s, &out, 0, 1, NULL, false, &why);
+    ok = ok && service_open(&s, NULL, false, &why);
     if (people) {
         service_share(&second, &s, 2, &cue[1]);
         service_share(&third, &s, 3, &cue[2]);
-        ok = ok && service_open(&second, &out, 0, 1, NULL, false, &why) &&
-             service_open(&third, &out, 0, 1, NULL, false, &why);
+        ok = ok && service_open(&second, NULL, false, &why) && service_open(&third, NULL, false, &why);
     }
     if (!ok)
         abort();
@@ -61,6 +62,7 @@ static void end(void)
         service_close(&second);
     }
     service_close(&s);
+    service_shared_close(&shared);
     further_close(&more);
 }
 
@@ -304,10 +306,11 @@ static void test_path(void)
     gait_camera moved = CAMERA, lens = CAMERA, below = CAMERA;
     begin(&path, NULL, false);
     announce(NULL, &CAMERA, 1000000);
-    CHECK(s.slot.known && path.count == 1 && lacks("needs keypoints to find a person with a moving camera"));
+    CHECK(shared.slot.known && path.count == 1 &&
+          lacks("needs keypoints to find a person with a moving camera"));
     moved.t[0] = 0.1f;
     announce(NULL, &moved, 1000000 + FRAME);
-    CHECK(path.count == 2 && s.slot.camera.t[0] == 0.0f); /* a pose, not another camera */
+    CHECK(path.count == 2 && shared.slot.camera.t[0] == 0.0f); /* a pose, not another camera */
     announce(NULL, &moved, 1000000);
     CHECK(path.refused == 1 && text("out of order"));
     lens.fx = 60;
@@ -344,20 +347,20 @@ static void test_people(void)
     start(&third, 0);
     frame(1000000, 0);
     CHECK(s.state == GAITMSG_STATUS_T_RUNNING && third.state == s.state && second.state != s.state);
-    CHECK(s.nearest_utime == -1); /* in the first frame it is not known where they are */
+    CHECK(shared.nearest_utime == -1); /* in the first frame it is not known where they are */
     s.last_status = GAIT_TRACK_TRACKING;
     frame(1000000 + FRAME, 1);
-    CHECK(s.nearest_utime == -1); /* one is not enough */
+    CHECK(shared.nearest_utime == -1); /* one is not enough */
     s.last_status = third.last_status = GAIT_TRACK_TRACKING;
     frame(1000000 + 2 * FRAME, 2);
-    CHECK(s.nearest_utime == 1000000 + 2 * FRAME);
+    CHECK(shared.nearest_utime == 1000000 + 2 * FRAME);
     s.last_status = GAIT_TRACK_TRACKING;
     third.last_status = GAIT_TRACK_LOST;
     frame(1000000 + 3 * FRAME, 3);
-    CHECK(s.nearest_utime == -1);
+    CHECK(shared.nearest_utime == -1);
     s.last_status = third.last_status = GAIT_TRACK_TRACKING;
     frame(1000000 + 2 * FRAME, 4); /* before their last frame */
-    CHECK(s.nearest_utime == -1);
+    CHECK(shared.nearest_utime == -1);
     CHECK(third.counts.rejected == 1 && strcmp(third.complaint.text, s.complaint.text) == 0);
     end();
 }

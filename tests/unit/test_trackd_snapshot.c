@@ -86,7 +86,8 @@ static void *layer_malloc(size_t bytes)
 #include "toy_model.h"
 
 static char folder[] = P_tmpdir "/gait_snapshot_XXXXXX", path[64], model[64];
-static service s;
+static service_shared shared;
+static service s = {.shared = &shared};
 
 static void write_file(const char *name, const void *data, size_t bytes)
 {
@@ -112,10 +113,11 @@ static void start(void)
     write_file(model, toy, bytes);
     gait_tracker_default(&config, GAIT_MODE_DEFAULT);
     config.particles = config.acquisition_particles = 16;
-    s.max_pixels = 48 * 32;
+    shared.out = &out;
+    shared.max_pixels = 48 * 32;
     gait_tracker_prior(toy_model(), &mean, &sd, NULL);
-    camera_use(&s.slot, &camera);
-    if (!tracking_open(&s.track, model, &config, &why) || !service_open(&s, &out, 0, 1, NULL, false, &why) ||
+    camera_use(&shared.slot, &camera);
+    if (!tracking_open(&s.track, model, &config, &why) || !service_open(&s, NULL, false, &why) ||
         !service_make_trackers(&s, &why) || !tracking_start(&s.track, &mean, &sd, 0, &why))
         abort();
     s.state = GAITMSG_STATUS_T_RUNNING;
@@ -291,12 +293,12 @@ static void test_fit(void)
     s.person = 0;
     file_bytes part = {fitting.data, RECORD - 1};
     CHECK(!resume(path, &s, &part, &why) && strstr(why.text, "too short"));
-    s.slot.fixed = true; /* that of --camera may be larger than announced ones */
-    s.max_pixels = 1;
+    shared.slot.fixed = true; /* that of --camera may be larger than announced ones */
+    shared.max_pixels = 1;
     s.last_utime = 5;
     CHECK(resume(path, &s, &fitting, &why) && s.last_utime == 33333);
-    s.slot.fixed = false;
-    s.max_pixels = 48 * 32;
+    shared.slot.fixed = false;
+    shared.max_pixels = 48 * 32;
     free(fitting.data);
 }
 
@@ -481,5 +483,6 @@ int main(void)
     unlink(model);
     rmdir(folder);
     service_close(&s);
+    service_shared_close(&shared);
     return CHECK_DONE();
 }

@@ -84,7 +84,7 @@ static bool load_lift(service *s, const settings *want, lift_service *lift, sink
         return true;
     if (!lift_service_open(lift, model, &set, out, why))
         return false;
-    s->lift = lift;
+    s->shared->lift = lift;
     s->track.memory_bytes += lift->file.bytes + lift->memory_bytes;
     return true;
 }
@@ -100,7 +100,7 @@ static void open_paths(service *s, const settings *want, parts *p)
 {
     pose_path const none = {.turn_sd = want->pose_turn_sd / 57.29578f, .place_sd = want->pose_place_sd};
     p->path = none;
-    s->path = &p->path;
+    s->shared->path = &p->path;
     for (int i = 0; i < p->further.count; i++) {
         p->further_path[i] = none;
         p->further.camera[i].path = &p->further_path[i];
@@ -108,12 +108,12 @@ static void open_paths(service *s, const settings *want, parts *p)
 }
 
 /* The services of further people. */
-static bool add_people(service *s, const settings *want, parts *p, sink *out, message *why)
+static bool add_people(service *s, const settings *want, parts *p, message *why)
 {
     for (int k = 0; k + 1 < want->people; k++) {
         open_cue(s, want, &p->other_cue[k]);
         service_share(&p->other[k], s, k + 2, &p->other_cue[k]);
-        if (!service_open(&p->other[k], out, want->stream, want->threads, NULL, want->particles_channel, why))
+        if (!service_open(&p->other[k], NULL, want->particles_channel, why))
             return false;
     }
     return true;
@@ -137,25 +137,27 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
         s->cue = &p->cue;
     }
     (void)further_open(&p->further, want->further_streams, want->stream, why); /* checked with the settings */
-    s->further = p->further.count ? &p->further : NULL;
+    s->shared->further = p->further.count ? &p->further : NULL;
     if (want->moving_camera)
         open_paths(s, want, p);
-    s->max_gap = (double)want->max_gap;
-    s->max_pixels = want->max_pixels;
+    s->shared->out = out;
+    s->shared->stream = want->stream;
+    s->shared->threads = want->threads;
+    s->shared->max_gap = (double)want->max_gap;
+    s->shared->max_pixels = want->max_pixels;
     s->budget = (budget){.limit_us = (int64_t)(1e3f * want->budget_ms),
                          .low = want->adapt_particles,
                          .high = config.particles};
-    s->pool_bytes = threads->bytes;
+    s->shared->pool_bytes = threads->bytes;
     s->track.memory_bytes += threads->bytes;
-    if (!service_open(s, out, want->stream, want->threads, has_init ? &init : NULL, want->particles_channel,
-                      why) ||
-        !add_people(s, want, p, out, why))
+    if (!service_open(s, has_init ? &init : NULL, want->particles_channel, why) ||
+        !add_people(s, want, p, why))
         return false;
     if (want->camera[0]) {
         if (!camera_file_read(want->camera, &camera, why))
             return false;
-        s->slot.fixed = true;
-        camera_use(&s->slot, &camera);
+        s->shared->slot.fixed = true;
+        camera_use(&s->shared->slot, &camera);
         if (!service_make_trackers(s, why))
             return false;
     }
@@ -168,6 +170,9 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
 static void print_summary(const service *s, bool live)
 {
     const service_counts *const c = &s->counts;
+    const pose_path *const path = s->shared->path;
+    const further *const more = s->shared->further;
+    const lift_service *const lift = s->shared->lift;
     printf("frames %" PRId64 " dropped %" PRId64 " rejected %" PRId64, c->frames, c->dropped, c->rejected);
     printf(" step_ms median %.2f p99 %.2f max %.2f", histogram_quantile(&c->step, 0.5) / 1e3,
            histogram_quantile(&c->step, 0.99) / 1e3, c->step.largest / 1e3);
@@ -182,43 +187,43 @@ static void print_summary(const service *s, bool live)
         printf(" keypoint_messages %" PRId64 " keypoints_used %" PRId64 " keypoints_late %" PRId64
                " keypoints_left_out %" PRId64,
                s->cue->messages, s->cue->used, s->cue->late, s->cue->filter.left_out);
-    if (s->path)
-        printf(" poses_refused %" PRId64 " frames_without_pose %" PRId64, s->path->refused, s->path->unknown);
-    for (int i = 0; s->further && i < s->further->count; i++) {
-        const further_camera *const each = &s->further->camera[i];
+    if (path)
+        printf(" poses_refused %" PRId64 " frames_without_pose %" PRId64, path->refused, path->unknown);
+    for (int i = 0; more && i < more->count; i++) {
+        const further_camera *const each = &more->camera[i];
         printf(" stream_%d_used %" PRId64 " stream_%d_missing %" PRId64, each->stream, each->used,
                each->stream, each->missing);
         if (each->path)
             printf(" stream_%d_poses_refused %" PRId64 " stream_%d_frames_without_pose %" PRId64,
                    each->stream, each->path->refused, each->stream, each->path->unknown);
     }
-    if (s->lift)
+    if (lift)
         printf(" lift_frames %" PRId64 " lifted %" PRId64 " lift_rejected %" PRId64
                " lift_keypoints_left_out %" PRId64 " lift_ms median %.3f p99 %.3f",
-               s->lift->frames, s->lift->lifted, s->lift->rejected, s->lift->filter.left_out,
-               histogram_quantile(&s->lift->step, 0.5) / 1e3, histogram_quantile(&s->lift->step, 0.99) / 1e3);
+               lift->frames, lift->lifted, lift->rejected, lift->filter.left_out,
+               histogram_quantile(&lift->step, 0.5) / 1e3, histogram_quantile(&lift->step, 0.99) / 1e3);
     printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
 }
 
 /* Whether anything in a log was tracked or lifted; if not, report what is missing. */
 static bool check_result(const char *path, const service *s, message *why)
 {
-    int64_t const keypoints = s->lift ? s->lift->frames : 0;
+    int64_t const keypoints = s->shared->lift ? s->shared->lift->frames : 0;
     message lack = s->complaint;
     for (const service *each = s; each; each = each->next)
         if (each->tracked > 0)
             return true;
-    if (s->lift && s->lift->lifted > 0)
+    if (s->shared->lift && s->shared->lift->lifted > 0)
         return true;
-    if (s->arrived == 0 && keypoints == 0)
+    if (s->shared->arrived == 0 && keypoints == 0)
         return message_set(why, "%.120s: no frames on GAIT_IMAGE_%d%s; --stream selects another camera", path,
-                           s->stream, s->lift ? " and no keypoints of a known camera" : "");
-    if (s->arrived == 0)
+                           s->shared->stream, s->shared->lift ? " and no keypoints of a known camera" : "");
+    if (s->shared->arrived == 0)
         return message_set(why, "%.80s: none of its %" PRId64 " messages of keypoints was lifted: %.110s",
                            path, keypoints, lack.text[0] ? lack.text : "too few");
     service_lack(s, &lack);
-    return message_set(why, "%.80s: none of its %" PRId64 " frames was tracked: %.130s", path, s->arrived,
-                       lack.text);
+    return message_set(why, "%.80s: none of its %" PRId64 " frames was tracked: %.130s", path,
+                       s->shared->arrived, lack.text);
 }
 
 /* Whether the log that was played is complete and gave a result. */
@@ -307,7 +312,8 @@ static int failed(const message *why, int code)
 int main(int argc, char **argv)
 {
     static settings want;
-    static service s;
+    static service_shared shared;
+    static service s = {.shared = &shared};
     static parts extra;
     static workers threads;
     invocation call = {.argc = argc, .argv = argv};
@@ -333,6 +339,7 @@ int main(int argc, char **argv)
         for (service *each = s.next; each; each = each->next)
             service_close(each);
         service_close(&s);
+        service_shared_close(&shared);
         lift_service_close(&extra.lift);
         further_close(&extra.further);
     }

@@ -38,7 +38,7 @@ static bool newest(const receiver *r)
 /* Track the waiting frame, if there is one. */
 static void flush_held(receiver *r)
 {
-    frame_hold *const hold = &r->service->hold;
+    frame_hold *const hold = &r->service->shared->hold;
     image_view v;
     message why;
     if (hold->bytes && image_view_open(&v, hold->frame, hold->bytes, &why))
@@ -49,7 +49,7 @@ static void flush_held(receiver *r)
 /* Track the waiting frame if everything that it waits for has arrived. */
 static void flush_complete(receiver *r)
 {
-    const frame_hold *const hold = &r->service->hold;
+    const frame_hold *const hold = &r->service->shared->hold;
     if (hold->bytes && !service_waits(r->service, hold->utime))
         flush_held(r);
 }
@@ -69,11 +69,11 @@ static void on_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
     receiver *const r = user;
     image_view v;
     flush_held(r);
-    r->service->arrived++;
+    r->service->shared->arrived++;
     if (!open_view(r->service, buf, channel, &v))
         return;
     if (!service_waits(r->service, v.utime) ||
-        !frame_hold_keep(&r->service->hold, v.utime, buf->data, buf->data_size, buf->recv_utime))
+        !frame_hold_keep(&r->service->shared->hold, v.utime, buf->data, buf->data_size, buf->recv_utime))
         service_frame(r->service, &v, newest(r), buf->recv_utime);
 }
 
@@ -97,7 +97,7 @@ static void on_keypoints(const lcm_recv_buf_t *buf, const char *channel, void *u
         return;
     }
     keypoints_view again = v; /* each reader consumes its view */
-    if (s->lift && !lift_service_keypoints(s->lift, &v, buf->recv_utime, &why))
+    if (s->shared->lift && !lift_service_keypoints(s->shared->lift, &v, buf->recv_utime, &why))
         service_complain(s, "%.40s: %.180s", channel, why.text);
     if (cue && !keypoint_cue_take(cue, &again, &why))
         service_complain(s, "%.40s: %.180s", channel, why.text);
@@ -107,7 +107,7 @@ static void on_keypoints(const lcm_recv_buf_t *buf, const char *channel, void *u
 /* The further camera of a channel; NULL: it is the first camera's. */
 static further_camera *further_of(const receiver *r, const char *channel)
 {
-    further *const f = r->service->further;
+    further *const f = r->service->shared->further;
     return f ? further_find(f, atoi(strrchr(channel, '_') + 1)) : NULL;
 }
 
@@ -174,7 +174,7 @@ static bool subscribe_further(receiver *r, message *why)
     } kinds[] = {{"GAIT_CAMERA", on_camera},
                  {"GAIT_BACKGROUND", on_further_background},
                  {"GAIT_IMAGE", on_further_frame}};
-    const further *const f = r->service->further;
+    const further *const f = r->service->shared->further;
     bool ok = true;
     for (int i = 0; f && i < f->count; i++)
         for (size_t k = 0; ok && k < sizeof kinds / sizeof *kinds; k++) {
@@ -189,9 +189,10 @@ static bool subscribe_further(receiver *r, message *why)
 static bool subscribe_person(receiver *r, const service *s, message *why)
 {
     char tracks[32], name[3][LINK_CHANNEL];
-    snprintf(tracks, sizeof tracks, "GAIT_TRACKS_%d", r->service->stream);
-    return ((!s->lift && !s->cue) || link_subscribe(r->others, link_channel(tracks, s->person, name[0]),
-                                                    on_keypoints, r, OTHERS_WAITING, why)) &&
+    snprintf(tracks, sizeof tracks, "GAIT_TRACKS_%d", r->service->shared->stream);
+    return ((!s->shared->lift && !s->cue) ||
+            link_subscribe(r->others, link_channel(tracks, s->person, name[0]), on_keypoints, r,
+                           OTHERS_WAITING, why)) &&
            link_subscribe(r->others, link_channel("GAIT_COMMAND", s->person, name[1]), on_command, r,
                           OTHERS_WAITING, why) &&
            (r->log || link_subscribe(r->others, link_channel("GAIT_STATUS", s->person, name[2]), on_status, r,
@@ -200,7 +201,7 @@ static bool subscribe_person(receiver *r, const service *s, message *why)
 
 static bool subscribe(receiver *r, message *why)
 {
-    int const camera = r->service->stream;
+    int const camera = r->service->shared->stream;
     char name[3][32];
     snprintf(name[0], sizeof name[0], "GAIT_IMAGE_%d", camera);
     snprintf(name[1], sizeof name[1], "GAIT_CAMERA_%d", camera);
@@ -280,7 +281,7 @@ bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t
         int const ready = ppoll(fd, r->log ? 1 : 2, &wait, unblocked);
         if (ready < 0 && errno != EINTR)
             return message_set(why, "cannot wait for messages: %s", strerror(errno));
-        if (sink_ended(r->service->out, why))
+        if (sink_ended(r->service->shared->out, why))
             return false;
         if (ready > 0 && !serve(r)) {
             flush_held(r);

@@ -92,12 +92,8 @@ static bool open_particles(service *s, message *why)
            message_set(why, "not enough memory for --particles-channel with %zu particles", n);
 }
 
-bool service_open(service *s, sink *out, int stream, int threads, const init_state *init, bool particles,
-                  message *why)
+bool service_open(service *s, const init_state *init, bool particles, message *why)
 {
-    s->out = out;
-    s->stream = stream;
-    s->threads = threads;
     s->has_init = init != NULL;
     if (init)
         s->init = *init;
@@ -111,8 +107,12 @@ void service_close(service *s)
     free(s->hypothesis);
     free(s->cloud.weight);
     free(s->cloud.state);
-    frame_hold_close(&s->hold);
     tracking_close(&s->track);
+}
+
+void service_shared_close(service_shared *c)
+{
+    frame_hold_close(&c->hold);
 }
 
 /* Whether the tracker accepts such a start, which takes effect at its frame.  Without a tracker, before a camera is known,
@@ -129,9 +129,10 @@ static bool start_usable(service *s, const gait_state *mean, const gait_state *s
 /* Give the tracker the backgrounds of further cameras that arrived before it existed. */
 static void set_further_backgrounds(service *s)
 {
-    for (int i = 0; s->further && i < s->further->count; i++)
-        if (s->further->camera[i].background.data)
-            gait_tracker_set_background(s->track.tracker, 1 + i, &s->further->camera[i].background, NULL);
+    const further *const f = s->shared->further;
+    for (int i = 0; f && i < f->count; i++)
+        if (f->camera[i].background.data)
+            gait_tracker_set_background(s->track.tracker, 1 + i, &f->camera[i].background, NULL);
 }
 
 void service_share(service *s, service *first, int person, keypoint_cue *cue)
@@ -143,9 +144,7 @@ void service_share(service *s, service *first, int person, keypoint_cue *cue)
     tracking_share(&s->track, &first->track);
     s->first = first;
     s->person = person;
-    s->path = first->path;
-    s->max_gap = first->max_gap;
-    s->max_pixels = first->max_pixels;
+    s->shared = first->shared;
     s->budget = first->budget;
     s->cue = cue;
 }
@@ -167,14 +166,15 @@ static bool set_camera(service *s, const gait_camera *camera, message *why)
 
 bool service_make_trackers(service *s, message *why)
 {
-    const gait_camera *const camera = &s->slot.camera;
-    if (s->further && further_unknown(s->further))
+    service_shared *const c = s->shared;
+    const gait_camera *const camera = &c->slot.camera;
+    if (c->further && further_unknown(c->further))
         return true;
-    for (int i = 0; s->further && i < s->further->count; i++)
-        s->track.config.camera[1 + i] = s->further->camera[i].slot.camera;
-    s->track.config.cameras = 1 + (s->further ? s->further->count : 0);
-    s->track.memory_bytes -= s->hold.capacity;
-    frame_hold_close(&s->hold);
+    for (int i = 0; c->further && i < c->further->count; i++)
+        s->track.config.camera[1 + i] = c->further->camera[i].slot.camera;
+    s->track.config.cameras = 1 + (c->further ? c->further->count : 0);
+    s->track.memory_bytes -= c->hold.capacity;
+    frame_hold_close(&c->hold);
     bool made = set_camera(s, camera, why);
     size_t bytes = s->track.memory_bytes;
     int people = 1;
@@ -183,10 +183,10 @@ bool service_make_trackers(service *s, message *why)
         made = set_camera(each, camera, made ? why : &later) && made;
         bytes += each->track.memory_bytes;
     }
-    if (!made || ((s->cue || s->path || s->further) && !frame_hold_allocate(&s->hold, camera, why)) ||
-        (s->lift && !lift_service_camera(s->lift, camera, why)))
-        return (s->slot.known = s->slot.fixed), false;
-    s->track.memory_bytes += s->hold.capacity;
+    if (!made || ((s->cue || c->path || c->further) && !frame_hold_allocate(&c->hold, camera, why)) ||
+        (c->lift && !lift_service_camera(c->lift, camera, why)))
+        return (c->slot.known = c->slot.fixed), false;
+    s->track.memory_bytes += c->hold.capacity;
     set_further_backgrounds(s);
     const tracking *const t = &s->track;
     char trackers[32] = "tracker";
@@ -194,9 +194,9 @@ bool service_make_trackers(service *s, message *why)
         snprintf(trackers, sizeof trackers, "each of %d trackers", people);
     log_event("model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
               "%s %zu, pool %zu, pictures %zu)",
-              t->info.digest, camera->width, camera->height, t->config.particles, s->threads,
-              s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), bytes + s->hold.capacity,
-              t->model_bytes, trackers, t->tracker_bytes, s->pool_bytes, t->picture_bytes);
+              t->info.digest, camera->width, camera->height, t->config.particles, c->threads,
+              c->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), bytes + c->hold.capacity,
+              t->model_bytes, trackers, t->tracker_bytes, c->pool_bytes, t->picture_bytes);
     return true;
 }
 
@@ -211,11 +211,12 @@ static bool same_lens(const gait_camera *a, const gait_camera *b)
 
 int64_t service_pixels_left(const service *s, const camera_slot *slot)
 {
-    int64_t left = s->max_pixels;
-    if (slot != &s->slot && s->slot.known)
-        left -= camera_pixels(&s->slot.camera);
-    for (int i = 0; s->further && i < s->further->count; i++) {
-        const camera_slot *const other = &s->further->camera[i].slot;
+    const service_shared *const c = s->shared;
+    int64_t left = c->max_pixels;
+    if (slot != &c->slot && c->slot.known)
+        left -= camera_pixels(&c->slot.camera);
+    for (int i = 0; c->further && i < c->further->count; i++) {
+        const camera_slot *const other = &c->further->camera[i].slot;
         left -= other != slot && other->known ? camera_pixels(&other->camera) : 0;
     }
     return left > 0 ? left : 0;
@@ -224,16 +225,16 @@ int64_t service_pixels_left(const service *s, const camera_slot *slot)
 /* The poses of a camera; NULL: it stands still. */
 static pose_path *path_of(const service *s, const further_camera *c)
 {
-    return c ? c->path : s->path;
+    return c ? c->path : s->shared->path;
 }
 
 /* The camera of a message.  Its pose must be plausible, unless it is one of the poses of a moving camera. */
 static bool take_camera(const service *s, const further_camera *c, const gaitmsg_camera_t *msg,
                         gait_camera *out, message *why)
 {
-    const camera_slot *const slot = c ? &c->slot : &s->slot;
+    const camera_slot *const slot = c ? &c->slot : &s->shared->slot;
     char channel[24];
-    snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", c ? c->stream : s->stream);
+    snprintf(channel, sizeof channel, "GAIT_CAMERA_%d", c ? c->stream : s->shared->stream);
     return camera_from_message(msg, service_pixels_left(s, slot), out, why) &&
            ((path_of(s, c) && slot->known && same_lens(out, &slot->camera)) ||
             camera_plausible(out, channel, why));
@@ -251,7 +252,7 @@ static bool begin_anew(service *s, further_camera *c, message *why)
         made = further_allocate(c, why);
         s->track.memory_bytes += c->bytes;
     }
-    made = made && (!s->slot.known || service_make_trackers(s, why));
+    made = made && (!s->shared->slot.known || service_make_trackers(s, why));
     for (service *each = s; followed && each; each = each->next)
         rearm(each);
     return made;
@@ -260,14 +261,14 @@ static bool begin_anew(service *s, further_camera *c, message *why)
 /* Why there is no camera; none if the text is empty.  A new reason is reported with the next frame. */
 static void set_refused(service *s, const message *why)
 {
-    if (why->text[0] && strcmp(s->refused.text, why->text) != 0)
+    if (why->text[0] && strcmp(s->shared->refused.text, why->text) != 0)
         s->idle = SERVICE_IDLE_NOT;
-    s->refused = *why;
+    s->shared->refused = *why;
 }
 
 void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, int64_t arrival)
 {
-    camera_slot *const slot = c ? &c->slot : &s->slot;
+    camera_slot *const slot = c ? &c->slot : &s->shared->slot;
     pose_path *const path = path_of(s, c);
     gait_camera camera;
     message why, refused = {.text = ""};
@@ -356,7 +357,7 @@ void service_background(service *s, const image_view *v)
         take_background(s, is_first);
         service_share_background(s);
     }
-    s->compared = false;
+    s->shared->compared = false;
 }
 
 static void command_start(service *s, const gaitmsg_command_t *msg)
@@ -410,7 +411,7 @@ static void send_particles(service *s, const image_view *v)
     s->cloud.n = n < 0 ? 0 : n;
     for (int32_t i = 0; i < s->cloud.n; i++)
         convert_state(&s->hypothesis[i], &s->track.info, &s->cloud.state[i]);
-    sink_publish(s->out, "GAIT_PARTICLES", s->person, s->particles,
+    sink_publish(s->shared->out, "GAIT_PARTICLES", s->person, s->particles,
                  gaitmsg_particles_t_encode(s->particles, 0, (int)s->particles_bytes, &s->cloud));
 }
 
@@ -451,7 +452,7 @@ static void send_stride(service *s, const gait_estimate *e, int64_t frame)
         .speed = found.speed,
         .speed_sd = found.speed_sd,
     };
-    sink_publish(s->out, "GAIT_STRIDE", s->person, bytes,
+    sink_publish(s->shared->out, "GAIT_STRIDE", s->person, bytes,
                  gaitmsg_stride_t_encode(bytes, 0, sizeof bytes, &m));
 }
 
@@ -474,7 +475,8 @@ static void send_classes(service *s, const char *channel, int64_t frame, const g
                                  .nclasses = n,
                                  .name = name,
                                  .probability = probability};
-    sink_publish(s->out, channel, s->person, bytes, gaitmsg_classes_t_encode(bytes, 0, sizeof bytes, &m));
+    sink_publish(s->shared->out, channel, s->person, bytes,
+                 gaitmsg_classes_t_encode(bytes, 0, sizeof bytes, &m));
 }
 
 /* The estimate of the frame `lag` steps ago; steps that bridge a pause have no frame and are skipped. */
@@ -490,7 +492,7 @@ static void send_lagged(service *s)
     convert_estimate(s->track.model, &s->track.info, &e, &lagged);
     set_counters(&lagged.msg, s, p);
     send_classes(s, "GAIT_CLASSES_LAG", p->frame, &e);
-    sink_publish(s->out, "GAIT_ESTIMATE_LAG", s->person, encoded,
+    sink_publish(s->shared->out, "GAIT_ESTIMATE_LAG", s->person, encoded,
                  gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, &lagged.msg));
     send_stride(s, &e, p->frame);
 }
@@ -504,7 +506,7 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
     *now = (past_frame){e->frame, v->frame, s->steps, received, (int32_t)step_us};
     set_counters(m, s, now);
     send_classes(s, "GAIT_CLASSES", v->frame, e);
-    sink_publish(s->out, "GAIT_ESTIMATE", s->person, encoded,
+    sink_publish(s->shared->out, "GAIT_ESTIMATE", s->person, encoded,
                  gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, m));
     if (s->track.config.lag > 0)
         send_lagged(s);
@@ -531,9 +533,10 @@ void service_status(service *s, int64_t utime)
 /* Bit i: the empty scene of camera i is known. */
 static int32_t background_mask(const service *s)
 {
-    int32_t mask = s->track.background.data ? 1 << s->stream : 0;
-    for (int i = 0; s->further && i < s->further->count; i++)
-        mask |= s->further->camera[i].background.data ? 1 << s->further->camera[i].stream : 0;
+    const further *const f = s->shared->further;
+    int32_t mask = s->track.background.data ? 1 << s->shared->stream : 0;
+    for (int i = 0; f && i < f->count; i++)
+        mask |= f->camera[i].background.data ? 1 << f->camera[i].stream : 0;
     return mask;
 }
 
@@ -542,8 +545,8 @@ void service_send_status(service *s)
     char version[32];
     const histogram *const st = &s->counts.step, *const la = &s->counts.latency;
     uint32_t const v = gait_version();
-    bool const starved =
-        s->state == GAITMSG_STATUS_T_RUNNING && 1e-6 * (double)(clock_monotonic() - s->stepped) > s->max_gap;
+    bool const starved = s->state == GAITMSG_STATUS_T_RUNNING &&
+                         1e-6 * (double)(clock_monotonic() - s->stepped) > s->shared->max_gap;
     snprintf(version, sizeof version, "%u.%u.%u", v / 10000, v / 100 % 100, v % 100);
     gaitmsg_status_t const msg = {
         .utime = clock_wall(),
@@ -557,7 +560,7 @@ void service_send_status(service *s)
         .dropped = s->counts.dropped,
         .rejected = s->counts.rejected,
         .particles = s->wanted ? s->wanted : s->track.config.particles,
-        .threads = s->threads,
+        .threads = s->shared->threads,
         .step_us_median = histogram_quantile(st, 0.5),
         .step_us_p99 = histogram_quantile(st, 0.99),
         .step_us_max = st->largest,
@@ -568,7 +571,7 @@ void service_send_status(service *s)
         .text = starved ? "no frames arrive" : s->text.text,
     };
     s->sent[s->statuses++ % SERVICE_SENT] = msg.utime;
-    sink_publish(s->out, "GAIT_STATUS", s->person, encoded,
+    sink_publish(s->shared->out, "GAIT_STATUS", s->person, encoded,
                  gaitmsg_status_t_encode(encoded, 0, MESSAGE_BYTES, &msg));
     s->news = false;
 }

@@ -43,28 +43,37 @@ enum {
     SERVICE_IDLE_SEARCHING
 };
 
+/* What the services of all people share. */
+typedef struct service_shared {
+    sink *out; /* where messages go */
+    int threads;
+    size_t pool_bytes;     /* of the threads */
+    double max_gap;        /* longest pause that is bridged by prediction, seconds */
+    int stream;            /* number of the first camera, [0, 30] */
+    camera_slot slot;      /* the first camera; trackers are there when all cameras are known */
+    pose_path *path;       /* poses of the first camera, which moves; NULL: it stands still */
+    further *further;      /* further cameras; NULL: there is one */
+    int32_t max_pixels;    /* of all cameras that are announced, together */
+    message refused;       /* why the camera that was announced last cannot be used */
+    bool compared;         /* the background has been compared with a frame */
+    frame_hold hold;       /* the frame that waits for keypoints, a pose or further cameras */
+    int64_t arrived;       /* frames since the program started */
+    int64_t nearest_utime; /* of the frame whose people track.nearest of the first service shows; -1: none */
+    lift_service *lift;    /* the second service; NULL: not requested */
+} service_shared;
+
 /* Of several people each has a service: a list, of which the first one receives what concerns all. */
 typedef struct service {
+    service_shared *shared;
     tracking track;
     struct service *first, *next; /* first: NULL for itself */
     int person;                   /* whose channels these are; 0: people are not distinguished */
     gait_state last;              /* last estimate */
-    int64_t nearest_utime;        /* of the frame whose people track.nearest shows; -1: none */
     gait_track_status last_status;
-    lift_service *lift; /* the second service; NULL: not requested */
-    keypoint_cue *cue;  /* a detector's keypoints for the tracker; NULL: not requested */
-    pose_path *path;    /* poses of the first camera, which moves; NULL: it stands still */
-    further *further;   /* further cameras; NULL: there is one */
-    camera_slot slot;   /* the first camera; the tracker is there when all cameras are known */
-    frame_hold hold;    /* the frame that waits for keypoints, a pose or further cameras */
-    sink *out;          /* where messages go */
-    int threads;
-    int stream;         /* number of the camera, [0, 30] */
-    int32_t max_pixels; /* of all cameras that are announced, together */
+    keypoint_cue *cue; /* a detector's keypoints for the tracker; NULL: not requested */
     bool has_init;
     init_state init; /* of --init FILE */
     start_trigger start;
-    bool compared;  /* the background has been compared with a frame */
     bool seek;      /* start automatically, and again when the person is lost */
     int64_t fitted; /* capture time of the last frame at which the automatic start was solved */
     int8_t state;   /* GAITMSG_STATUS_T_* */
@@ -73,21 +82,18 @@ typedef struct service {
     int64_t sent[SERVICE_SENT]; /* times of the last statuses, a ring by their number */
     uint32_t statuses;
     service_counts counts;
-    int64_t arrived, tracked; /* frames since the program started, unaffected by RESET */
-    int64_t dropped_before;   /* value of counts.dropped at START */
-    int64_t last_frame;       /* highest number of a frame that arrived; -1: none */
-    int64_t last_arrived;     /* capture time of the last frame that arrived */
-    bool missed;              /* that frame was not tracked and is counted as dropped */
-    int64_t last_utime;       /* capture time of the last tracked frame, or of the start */
-    int64_t steps;            /* frames tracked since START */
-    int64_t stepped;          /* monotonic time of the last tracked frame, or of the start */
-    budget budget;            /* limit 0 for a log, which is played without dropping frames */
-    int32_t wanted;           /* particles requested last; 0 before there is a tracker */
-    size_t pool_bytes;        /* of the threads */
-    double max_gap;           /* longest pause that is bridged by prediction, seconds */
-    int idle;                 /* SERVICE_IDLE_* that was reported last */
-    message refused;          /* why the camera that was announced last cannot be used */
-    message text, complaint;  /* text of the status; last complaint on stderr */
+    int64_t tracked;         /* frames since the program started, unaffected by RESET */
+    int64_t dropped_before;  /* value of counts.dropped at START */
+    int64_t last_frame;      /* highest number of a frame that arrived; -1: none */
+    int64_t last_arrived;    /* capture time of the last frame that arrived */
+    bool missed;             /* that frame was not tracked and is counted as dropped */
+    int64_t last_utime;      /* capture time of the last tracked frame, or of the start */
+    int64_t steps;           /* frames tracked since START */
+    int64_t stepped;         /* monotonic time of the last tracked frame, or of the start */
+    budget budget;           /* limit 0 for a log, which is played without dropping frames */
+    int32_t wanted;          /* particles requested last; 0 before there is a tracker */
+    int idle;                /* SERVICE_IDLE_* that was reported last */
+    message text, complaint; /* text of the status; last complaint on stderr */
     estimate_message estimate;
     past_frame past[SERVICE_PAST];
     stride_meter meter;
@@ -98,10 +104,11 @@ typedef struct service {
     gaitmsg_particles_t cloud;
 } service;
 
-/* `track` is open.  With `particles`, also takes the memory for GAIT_PARTICLES. */
-bool service_open(service *s, sink *out, int stream, int threads, const init_state *init, bool particles,
-                  message *why);
+/* `shared` is set and `track` open.  With `particles`, also takes the memory for GAIT_PARTICLES. */
+bool service_open(service *s, const init_state *init, bool particles, message *why);
 void service_close(service *s);
+/* After all services have been closed. */
+void service_shared_close(service_shared *c);
 
 /* Make a service for one more person, before it is opened and the camera is set. */
 void service_share(service *s, service *first, int person, keypoint_cue *cue);

@@ -77,7 +77,7 @@ static bool begin(service *s, const image_view *v)
 {
     message why;
     int64_t utime;
-    start_trigger_answer const answer = start_trigger_reached(&s->start, v, s->max_gap, &utime, &why);
+    start_trigger_answer const answer = start_trigger_reached(&s->start, v, s->shared->max_gap, &utime, &why);
     if (answer == START_TRIGGER_WAIT)
         return false;
     if (answer == START_TRIGGER_MISSED ||
@@ -109,12 +109,12 @@ static const char *next_start(const service *s)
 static bool in_time(service *s, const image_view *v)
 {
     double const pause = 1e-6 * ((double)v->utime - (double)s->last_utime); /* cannot overflow */
-    if (fabs(pause) > s->max_gap) {
+    if (fabs(pause) > s->shared->max_gap) {
         stop(s);
         service_complain(s,
                          pause > 0 ? "no frame for %.3f s (at most %.3f): stopped; %s"
                                    : "capture time went back by %.3f s (at most %.3f): stopped; %s",
-                         fabs(pause), s->max_gap, next_start(s));
+                         fabs(pause), s->shared->max_gap, next_start(s));
         return false;
     }
     if (pause > 0 || (pause == 0 && s->steps == 0))
@@ -128,16 +128,16 @@ static bool in_time(service *s, const image_view *v)
 static void compare_scene(service *s, const gait_image *frame)
 {
     int32_t other = 0;
-    if (s->compared || s->path || s->first || !s->track.background.data)
+    if (s->shared->compared || s->shared->path || s->first || !s->track.background.data)
         return;
-    s->compared = true;
+    s->shared->compared = true;
     (void)gait_start_other_scene(s->track.start, frame, &s->track.background, &other, NULL);
     if (other)
         service_complain(
             s,
             "half of the image differs from the background: give that of this camera (--background, "
             "GAIT_BACKGROUND_%d)",
-            s->stream);
+            s->shared->stream);
 }
 
 /* Give the automatic start the keypoints of a frame and the regions that differ from the background; false: there are
@@ -145,13 +145,14 @@ static void compare_scene(service *s, const gait_image *frame)
 static bool observe(service *s, int64_t utime, const gait_image *frame)
 {
     gait_start *const start = s->track.start;
+    const pose_path *const path = s->shared->path;
     const gait_keypoint *const found = s->cue ? keypoint_cue_at(s->cue, utime) : NULL;
-    bool const scene = s->track.background.data != NULL && !s->path && !s->person;
+    bool const scene = s->track.background.data != NULL && !path && !s->person;
     bool fine = true;
     gait_camera_pose pose;
     message why;
-    if (s->path && (pose_path_at(s->path, utime, &pose, &why) != POSE_KNOWN ||
-                    gait_start_set_pose(start, &pose, NULL) != GAIT_OK))
+    if (path && (pose_path_at(path, utime, &pose, &why) != POSE_KNOWN ||
+                 gait_start_set_pose(start, &pose, NULL) != GAIT_OK))
         return false;
     if (found)
         fine = gait_start_add(start, utime, found, NULL) == GAIT_OK;
@@ -259,18 +260,18 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
         return false;
     }
     compare_scene(s, &frame.image[0]);
-    if (s->further && !further_images(s->further, v->utime, &frame, &why))
+    if (s->shared->further && !s->first && !further_images(s->shared->further, v->utime, &frame, &why))
         service_complain(s, "%s", why.text);
     if (s->cue)
         frame.keypoints[0] = keypoint_cue_use(s->cue, v->utime);
-    if (s->path && pose_path_now(s->path, v->utime, &pose, &why))
+    if (s->shared->path && pose_path_now(s->shared->path, v->utime, &pose, &why))
         frame.pose[0] = &pose;
-    else if (s->path) {
+    else if (s->shared->path) {
         frame.image[0].data = NULL; /* the camera's pose is unknown: only predict */
         service_complain(s, "%s", why.text);
     }
-    const service *const first = s->first ? s->first : s;
-    if (first->nearest_utime == v->utime) {
+    if (s->shared->nearest_utime == v->utime) {
+        const service *const first = s->first ? s->first : s;
         const gait_camera *const c = &s->track.config.camera[0];
         frame.people[0] = (gait_image){first->track.nearest, c->width, c->height, c->width, GAIT_GREY8};
         frame.person = (uint64_t)s->person;
@@ -327,24 +328,25 @@ static int idle_of(const service *s)
         return SERVICE_IDLE_NOT;
     if (!s->seek)
         return SERVICE_IDLE_START;
-    return (s->track.background.data && !s->path && !s->person) || s->cue ? SERVICE_IDLE_SEARCHING
-                                                                          : SERVICE_IDLE_SCENE;
+    return (s->track.background.data && !s->shared->path && !s->person) || s->cue ? SERVICE_IDLE_SEARCHING
+                                                                                  : SERVICE_IDLE_SCENE;
 }
 
 /* State what is missing. */
 static void set_lack(const service *s, int idle, message *why)
 {
-    int const i = s->stream;
-    const further_camera *const unknown = s->slot.known && s->further ? further_unknown(s->further) : NULL;
+    const service_shared *const c = s->shared;
+    int const i = c->stream;
+    const further_camera *const unknown = c->slot.known && c->further ? further_unknown(c->further) : NULL;
     if (idle == SERVICE_IDLE_CAMERA && unknown)
         message_set(why, "no camera: announce it on GAIT_CAMERA_%d", unknown->stream);
-    else if (idle == SERVICE_IDLE_CAMERA && s->refused.text[0])
-        message_set(why, "no usable camera: %.200s", s->refused.text);
+    else if (idle == SERVICE_IDLE_CAMERA && c->refused.text[0])
+        message_set(why, "no usable camera: %.200s", c->refused.text);
     else if (idle == SERVICE_IDLE_CAMERA)
         message_set(why, "no camera: give --camera or announce it on GAIT_CAMERA_%d", i);
     else if (idle == SERVICE_IDLE_START)
         message_set(why, "no START: send it on GAIT_COMMAND, or run with --init");
-    else if (idle == SERVICE_IDLE_SCENE && s->path)
+    else if (idle == SERVICE_IDLE_SCENE && c->path)
         message_set(why, "--init auto needs keypoints to find a person with a moving camera: run with "
                          "--keypoints-term, or send START on GAIT_COMMAND");
     else if (idle == SERVICE_IDLE_SCENE)
@@ -383,13 +385,14 @@ void service_lack(const service *s, message *why)
 
 bool service_waits(const service *s, int64_t utime)
 {
+    const service_shared *const c = s->shared;
     gait_camera_pose pose;
     message why;
     for (const service *each = s; each; each = each->next)
         if (each->cue && !keypoint_cue_arrived(each->cue, utime))
             return true;
-    return (s->path && pose_path_at(s->path, utime, &pose, &why) == POSE_LATER) ||
-           (s->further && further_waits(s->further, utime));
+    return (c->path && pose_path_at(c->path, utime, &pose, &why) == POSE_LATER) ||
+           (c->further && further_waits(c->further, utime));
 }
 
 /* Draw who is nearest in a frame, if at least two people are followed. */
@@ -397,7 +400,7 @@ static void draw_nearest(service *s, int64_t utime)
 {
     nearest_body body[PEOPLE_MOST];
     int count = 0;
-    s->nearest_utime = -1;
+    s->shared->nearest_utime = -1;
     if (!s->next || !s->track.background.data)
         return;
     for (service *each = s; each; each = each->next) {
@@ -412,7 +415,7 @@ static void draw_nearest(service *s, int64_t utime)
     if (count < 2)
         return;
     nearest_draw(s->track.model, &s->track.config.camera[0], body, count, s->track.drawing, s->track.nearest);
-    s->nearest_utime = utime;
+    s->shared->nearest_utime = utime;
 }
 
 /* One person's part of service_frame(). */

@@ -36,13 +36,13 @@ static const char MAGIC[8] = "GAITTRD3";
 
 static int count_cameras(const service *s)
 {
-    return 1 + (s->further ? s->further->count : 0);
+    return 1 + (s->shared->further ? s->shared->further->count : 0);
 }
 
 /* Number of a camera. */
 static int stream_of(const service *s, int camera)
 {
-    return camera ? s->further->camera[camera - 1].stream : s->stream;
+    return camera ? s->shared->further->camera[camera - 1].stream : s->shared->stream;
 }
 
 /* FNV-1a of a file but for magic and checksum: another byte anywhere changes it. */
@@ -331,15 +331,15 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
         return message_set(why, "shorter or longer than its lengths state");
     if (h->cameras != count_cameras(s))
         return message_set(why, "for another number of cameras");
-    int64_t left = s->max_pixels;
+    int64_t left = s->shared->max_pixels;
     for (int i = 0; i < h->cameras; i++) {
         if (h->stream[i] != stream_of(s, i))
             return message_set(why, "for --%s %d", i ? "further-streams" : "stream", (int)h->stream[i]);
-        if (!camera_check(&h->camera[i], i || !s->slot.fixed ? left : INT64_MAX, why))
+        if (!camera_check(&h->camera[i], i || !s->shared->slot.fixed ? left : INT64_MAX, why))
             return false;
         left -= camera_pixels(&h->camera[i]);
     }
-    return !s->slot.known || camera_same(&h->camera[0], &s->slot.camera) ||
+    return !s->shared->slot.known || camera_same(&h->camera[0], &s->shared->slot.camera) ||
            message_set(why, "for a camera other than --camera");
 }
 
@@ -347,8 +347,8 @@ static bool fits(const service *s, const file_bytes *file, head *h, message *why
 static bool set_cameras(service *s, const head *h, message *why)
 {
     for (int i = 0; i < h->cameras; i++) {
-        further_camera *const c = i ? &s->further->camera[i - 1] : NULL;
-        camera_slot *const slot = c ? &c->slot : &s->slot;
+        further_camera *const c = i ? &s->shared->further->camera[i - 1] : NULL;
+        camera_slot *const slot = c ? &c->slot : &s->shared->slot;
         if (slot->known)
             continue;
         camera_use(slot, &h->camera[i]);
