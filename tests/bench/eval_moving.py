@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Tracks from moving cameras, compared with the same walks in front of a camera that stands still.
 
-    eval_moving.py [--record] [--seeds 24,41] [--frames 60]
+    eval_moving.py [--record] [--seeds 24,41,61,62] [--frames 60]
 
 Simulated walks (gait simulate --moving), each started from its init file, without a detector.  The arms use
 exact poses; poses with errors that are drawn anew for each frame, with and without their standard deviations
@@ -40,7 +40,7 @@ ARMS = ("exact", "noisy", "noisy, sd not given", "estimated")
 def main() -> int:
     """Make, track, compare, print; exit code 1 if a median misses its target."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    options.add_argument("--seeds", default="24,41")
+    options.add_argument("--seeds", default="24,41,61,62")
     options.add_argument("--frames", type=int, default=60)
     options.add_argument("--record", action="store_true")
     args = options.parse_args()
