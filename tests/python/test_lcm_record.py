@@ -144,6 +144,27 @@ def test_two_trackers_on_one_url_are_reported(estimates, tmp_path, case):
     assert frames == list(range(len(frames))) and f"before this was noticed: {len(frames)})" in done.stderr
 
 
+@pytest.mark.parametrize("case", ["killed once", "killed again at once", "killed again after a snapshot"])
+def test_a_tracker_that_goes_on_from_a_snapshot_is_the_same_stream(estimates, tmp_path, case):
+    """Its steps go back to those of the snapshot; the frames since then count as dropped, as they were."""
+
+    def resumed(frames, step, snapshot):
+        """Estimates of these frames, from this step on."""
+        return [
+            later(e, 2 * SECOND * (step > 3), step=step + k, dropped=frames[0] - snapshot - 1)
+            for k, e in enumerate(estimates[i] for i in frames)
+        ]
+
+    sent = [*estimates[:6], *resumed(range(8, COUNT), 3, 2)]
+    if case != "killed once":
+        sent = [*estimates[:6], *resumed(range(8, 12), 3, 2)]
+        again = 3 if case == "killed again at once" else 5
+        sent += resumed(range(14, COUNT), again, again - 1)
+    done, frames = record(tmp_path, sent)
+    assert done.returncode == 0 and done.stderr.count("\n") == 1, done.stderr
+    assert frames == [e.frame for e in sent]
+
+
 def test_another_stream_that_begins_is_reported(estimates, tmp_path):
     again = [later(e, 60 * SECOND, utime=e.utime + 60 * SECOND) for e in estimates]
     done, frames = record(tmp_path, [*estimates, *again])

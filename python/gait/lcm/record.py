@@ -25,6 +25,7 @@ LISTENING = "listening"
 _NO_IMAGE = np.empty((0, 0), np.uint8)
 _TURN = 0.1  # seconds; longest wait before checking whether to stop
 _QUEUE = 1000  # estimates that may wait for the disk
+_SNAPSHOT = 1_000_000  # microseconds; period of gait-trackd's snapshots
 
 
 @dataclass
@@ -117,6 +118,7 @@ class Recorder:
         self._log: LogWriter | None = None
         self._origin = 0
         self._two, self._first = False, 0
+        self._restart: Any = None  # last estimate whose steps went back
         self._last = 0.0
         self.figures = Figures()
         self.stop = False
@@ -215,13 +217,28 @@ class Recorder:
     def _goes_on(self, previous: Any, message: Any) -> bool:
         """Whether an estimate continues the stream of the previous one; if not, store why in `other`."""
         played_again = message.receive_utime == self._first  # as when a log repeats
-        if not played_again and _of_two(previous, message):
+        if not played_again and (_of_two(previous, message) or self._alternates(previous, message)):
             self._two = True
         elif _number(message) <= _number(previous):
             self.other = f"another stream began (frame {_number(message)} after {_number(previous)})"
         else:
             return True
         return False
+
+    def _alternates(self, previous: Any, message: Any) -> bool:
+        """Whether steps go back as those of two trackers do that run at the same time and share the frames.
+
+        Steps of one tracker go back when it continues from a snapshot.  It may be killed again, but the
+        snapshot is then the same, or was written since.
+        """
+        if not _goes_back(previous, message):
+            return False
+        before, self._restart = self._restart, message
+        return (
+            before is not None
+            and message.step > before.step
+            and message.receive_utime - before.receive_utime < _SNAPSHOT
+        )
 
     def _flush(self) -> None:
         """Write waiting rows; the first waits for the second, as both are needed for the time of frame 0."""
@@ -251,13 +268,20 @@ def _number(message: Any) -> int:
 
 
 def _of_two(previous: Any, message: Any) -> bool:
-    """Whether two successive estimates come from two trackers that run at the same time.
+    """Whether two successive estimates show that two trackers run at the same time.
 
-    One tracker makes one estimate per frame, receives frames in order, and counts its steps; only a later
-    START makes it count from 0 again.
+    One tracker makes one estimate per frame, and receives frames in order.
     """
-    if _number(message) <= _number(previous):
-        return message.utime == previous.utime or message.receive_utime <= previous.receive_utime
+    return _number(message) <= _number(previous) and (
+        message.utime == previous.utime or message.receive_utime <= previous.receive_utime
+    )
+
+
+def _goes_back(previous: Any, message: Any) -> bool:
+    """Whether steps of a later frame do not continue those of the previous estimate.
+
+    A tracker counts its steps; only a later START makes it count from 0 again.
+    """
     began = message.frame - message.step - message.dropped
     return message.frame >= 0 and message.step <= previous.step and began <= previous.frame
 
