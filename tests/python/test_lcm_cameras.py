@@ -11,6 +11,7 @@ import pytest
 
 from gait.bindings.config import TrackerConfig
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.lcm.capture import Publisher, Setup
 from gait.lcm.link import gaitmsg, open_lcm, private_url
 from gait.lcm.messages import camera_message, image_message
@@ -111,6 +112,31 @@ def test_each_of_two_cameras_waits_until_its_own_background_is_known():
         senders = [Publisher(open_lcm(url), Setup(i, cameras[i], plate=rig.plate())) for i in cameras]
         waits = [both.submit(sender.meet, rig.PATIENCE) for sender in senders]
         assert [wait.result() for wait in waits] == [None, None]
+
+
+def test_capture_names_the_camera_for_which_the_tracker_still_waits():
+    rig.need_multicast()
+    url = private_url()
+    with rig.daemon(url, "--further-streams", 3):
+        sender = Publisher(open_lcm(url), Setup(0, rig.CAMERA, plate=rig.plate()))
+        with pytest.raises(UserError, match="status: waiting for a camera on GAIT_CAMERA_3$"):
+            sender.meet(2)
+
+
+def test_capture_does_not_begin_while_the_tracker_has_another_camera():
+    """It would be used for ten seconds; each stream waits for its own."""
+    rig.need_multicast()
+    url, cameras = private_url(), {0: rig.CAMERA, 3: SIDE}
+    with rig.daemon(url, "--further-streams", 3), ThreadPoolExecutor() as both:
+        senders = [Publisher(open_lcm(url), Setup(i, cameras[i])) for i in cameras]
+        assert [wait.result() for wait in [both.submit(s.meet, rig.PATIENCE) for s in senders]] == [
+            None,
+            None,
+        ]
+        other = Publisher(open_lcm(url), Setup(3, replace(SIDE, fx=SIDE.fx + 5)))
+        with pytest.raises(UserError, match=r"status: not the camera in use: GAIT_CAMERA_3; a different cam"):
+            other.meet(2)
+        senders[0].meet(rig.PATIENCE)
 
 
 def test_after_a_kill_two_streams_are_tracked_as_if_nothing_had_happened(tmp_path):

@@ -144,6 +144,9 @@ def test_capture_waits_for_trackers_of_several_people_and_starts_one_of_them(tmp
     with rig.daemon(url, "--keypoints-term", "--people", 2) as (listener, _):
         done = rig.gait(*words, "--wait", 3)
         assert done.returncode == 1 and "one of several people answers on GAIT_STATUS_" in done.stderr
+        done = rig.gait(*words, "--wait", 3, "--person", 3)
+        assert done.returncode == 1 and "answers on GAIT_STATUS_" in done.stderr
+        assert "none on GAIT_STATUS_3" in done.stderr and "start gait-trackd" not in done.stderr
         done = rig.gait(*words, "--wait", rig.PATIENCE, "--person", 2)
         assert done.returncode == 0, done.stderr
         listener.until(lambda: bool(listener.second), "an estimate of person 2")

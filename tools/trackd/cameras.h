@@ -27,6 +27,7 @@ typedef struct camera_slot {
     gait_camera camera;
     gait_camera other;   /* announced, but not the one in use */
     int64_t other_since; /* arrival of its first message since the one in use was announced; -1: none */
+    int64_t refused;     /* monotonic time at which one was announced last that is not in use; 0: none was */
 } camera_slot;
 
 typedef enum { CAMERA_SAME, CAMERA_REFUSED, CAMERA_NEW } camera_answer;

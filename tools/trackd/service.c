@@ -38,8 +38,12 @@ void service_complain(service *s, const char *format, ...)
 /* Set the state while nothing is tracked: what the service waits for. */
 static void set_idle(service *s)
 {
+    const service_shared *const c = s->shared;
+    const further_camera *const unknown = c->slot.known && c->further ? further_unknown(c->further) : NULL;
+    message camera;
+    message_set(&camera, "waiting for a camera on GAIT_CAMERA_%d", unknown ? unknown->stream : c->stream);
     if (!s->track.tracker)
-        service_set_state(s, GAITMSG_STATUS_T_WAITING, "waiting for a camera");
+        service_set_state(s, GAITMSG_STATUS_T_WAITING, camera.text);
     else if (s->start.armed)
         service_set_state(s, GAITMSG_STATUS_T_ARMED, "waiting for the frame of the start");
     else
@@ -168,8 +172,10 @@ bool service_make_trackers(service *s, message *why)
 {
     service_shared *const c = s->shared;
     const gait_camera *const camera = &c->slot.camera;
-    if (c->further && further_unknown(c->further))
+    if (c->further && further_unknown(c->further)) {
+        set_idle(s);
         return true;
+    }
     for (int i = 0; c->further && i < c->further->count; i++)
         s->track.config.camera[1 + i] = c->further->camera[i].slot.camera;
     s->track.config.cameras = 1 + (c->further ? c->further->count : 0);
@@ -274,6 +280,7 @@ void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, 
     message why, refused = {.text = ""};
     if (!take_camera(s, c, msg, &camera, &refused)) {
         service_complain(s, "%s", refused.text);
+        slot->refused = clock_monotonic();
         if (!c)
             set_refused(s, &refused);
         return;
@@ -284,6 +291,8 @@ void service_camera(service *s, further_camera *c, const gaitmsg_camera_t *msg, 
         camera = slot->known ? slot->camera : camera;
     }
     camera_answer const answer = camera_announced(slot, &camera, arrival);
+    if (answer == CAMERA_REFUSED)
+        slot->refused = clock_monotonic();
     if (answer == CAMERA_REFUSED && slot->fixed)
         service_complain(s, "a camera other than that of --camera was announced; it is ignored");
     else if (answer == CAMERA_REFUSED)
@@ -540,13 +549,39 @@ static int32_t background_mask(const service *s)
     return mask;
 }
 
+/* Name the channel of a camera if another than the one in use has been announced there in the last seconds. */
+static void name_refused(const camera_slot *slot, int stream, message *out)
+{
+    int64_t const lately = 3000000; /* they are announced every two seconds */
+    size_t const n = strlen(out->text);
+    if (slot->known && slot->refused && clock_monotonic() - slot->refused < lately)
+        snprintf(out->text + n, sizeof out->text - n, " GAIT_CAMERA_%d", stream);
+}
+
+/* The text of the status. */
+static void set_text(const service *s, message *out)
+{
+    const service_shared *const c = s->shared;
+    const service *const first = s->first ? s->first : s;
+    bool const starved =
+        s->state == GAITMSG_STATUS_T_RUNNING && 1e-6 * (double)(clock_monotonic() - s->stepped) > c->max_gap;
+    message channels = {.text = ""};
+    name_refused(&c->slot, c->stream, &channels);
+    for (int i = 0; c->further && i < c->further->count; i++)
+        name_refused(&c->further->camera[i].slot, c->further->camera[i].stream, &channels);
+    if (channels.text[0])
+        message_set(out, "not the camera in use:%.70s; %.150s", channels.text, first->complaint.text);
+    else
+        message_set(out, "%s", starved ? "no frames arrive" : s->text.text);
+}
+
 void service_send_status(service *s)
 {
+    message text;
     char version[32];
     const histogram *const st = &s->counts.step, *const la = &s->counts.latency;
     uint32_t const v = gait_version();
-    bool const starved = s->state == GAITMSG_STATUS_T_RUNNING &&
-                         1e-6 * (double)(clock_monotonic() - s->stepped) > s->shared->max_gap;
+    set_text(s, &text);
     snprintf(version, sizeof version, "%u.%u.%u", v / 10000, v / 100 % 100, v % 100);
     gaitmsg_status_t const msg = {
         .utime = clock_wall(),
@@ -568,7 +603,7 @@ void service_send_status(service *s)
         .latency_us_p99 = histogram_quantile(la, 0.99),
         .latency_us_max = la->largest,
         .memory_bytes = (int64_t)s->track.memory_bytes,
-        .text = starved ? "no frames arrive" : s->text.text,
+        .text = text.text,
     };
     s->sent[s->statuses++ % SERVICE_SENT] = msg.utime;
     sink_publish(s->shared->out, "GAIT_STATUS", s->person, encoded,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -188,6 +189,7 @@ def parse_rate(text: str) -> float | None:
 ANNOUNCE = 2.0  # seconds of video between announcements of camera and empty scene
 _AHEAD = 8  # frames decoded before they are due
 _ASK = 0.5  # seconds after which a message is repeated if the tracker does not answer
+_HEARD = 0.25  # seconds after which a tracker has seen an announcement
 _LEAD = 0.5  # seconds from START to the first frame, in which the tracker can confirm
 
 
@@ -225,6 +227,10 @@ class Setup:
     person: int | None = None
 
 
+_CAMERAS_REFUSED = re.compile("not the camera in use:([^;]*);")
+"""Begin of the text of a status: channels on which another camera than the one in use was announced."""
+
+
 class Publisher:
     """Sends one stream of frames on ``GAIT_IMAGE_<i>``, with calibration, empty scene and START.
 
@@ -243,14 +249,13 @@ class Publisher:
     def __init__(self, out: lcm.LCM | LogWriter, setup: Setup) -> None:
         self._setup, self._out = setup, out
         self._status: Any = None
-        self._answering = ""  # channel of the last status
+        self._answered = 0.0  # monotonic time of the last status
+        self._other = ""  # channel of a status that is not waited for
+        self._answers = channel_of(setup.person, "GAIT_STATUS")
         self._announced = 0.0
         self.sent = 0
         if not isinstance(self._out, LogWriter):
-            answers = (
-                "GAIT_STATUS(_[1-8])?" if setup.person is None else channel_of(setup.person, "GAIT_STATUS")
-            )
-            self._out.subscribe(answers, self._on_status).set_queue_capacity(8)
+            self._out.subscribe("GAIT_STATUS(_[1-8])?", self._on_status).set_queue_capacity(8)
 
     def meet(self, patience: float) -> None:
         """Announce camera and empty scene until a tracker confirms them.
@@ -260,7 +265,12 @@ class Publisher:
         UserError
             If no tracker has after `patience` seconds.
         """
-        self._ask(patience, lambda: self.announce(0), self._is_ready, "knows the camera")
+        asked = time.monotonic()
+
+        def is_ready(status: Any) -> bool:
+            return self._answered - asked >= _HEARD and self._is_ready(status)
+
+        self._ask(patience, lambda: self.announce(0), is_ready, "knows the camera")
 
     def begin(self, source: FileSource | DeviceSource, rate: float | None, patience: float) -> Pacer:
         """Announce, send START and return the stream's clock, by which the first frame is due from now on.
@@ -282,8 +292,8 @@ class Publisher:
             if self._listen(0.8 * _LEAD, partial(_confirms, asked)):
                 return pacer
         remedy = "is gait-trackd running on this URL?"
-        if self._setup.person is None and self._answering not in ("", "GAIT_STATUS"):
-            remedy = f"one of several people answers on {self._answering}: give --person"
+        if self._setup.person is None and self._other:
+            remedy = f"one of several people answers on {self._other}: give --person"
         raise UserError(f"no tracker confirmed START within {patience:g} s; {remedy}")
 
     def send(
@@ -339,7 +349,9 @@ class Publisher:
 
     def _is_ready(self, status: Any) -> bool:
         plate = self._setup.plate is None or bool(status.background_mask >> self._setup.stream & 1)
-        return plate and status.state != gaitmsg.status_t.WAITING
+        others = _CAMERAS_REFUSED.match(status.text)
+        refused = others is not None and f"GAIT_CAMERA_{self._setup.stream}" in others[1].split()
+        return plate and not refused and status.state != gaitmsg.status_t.WAITING
 
     def _ask(
         self, patience: float, question: Callable[[], None], answered: Callable[[Any], bool], what: str
@@ -349,10 +361,15 @@ class Publisher:
             question()
             if self._listen(_ASK, answered):
                 return
-        heard = f"; its status: {self._status.text}" if self._status else "; no status was received"
-        raise UserError(
-            f"no tracker {what} after {patience:g} s{heard}; start gait-trackd on the same URL first"
-        )
+        why = "no status was received; start gait-trackd on the same URL first"
+        if self._status:
+            why = f"its status: {self._status.text}"
+        elif self._other:
+            why = (
+                f"a tracker answers on {self._other}, none on {self._answers}: give --person as it has, "
+                f"or leave it out"
+            )
+        raise UserError(f"no tracker {what} after {patience:g} s; {why}")
 
     def _listen(self, seconds: float, wanted: Callable[[Any], bool]) -> bool:
         """Wait until a `wanted` status arrives; return whether one has."""
@@ -365,7 +382,10 @@ class Publisher:
         return False
 
     def _on_status(self, channel: str, data: bytes) -> None:
-        self._status, self._answering = decode(gaitmsg.status_t, data, channel), channel
+        if channel != self._answers:
+            self._other = channel
+        if channel == self._answers or self._setup.person is None:
+            self._status, self._answered = decode(gaitmsg.status_t, data, channel), time.monotonic()
 
 
 def _confirms(command_id: int, status: Any) -> bool:
