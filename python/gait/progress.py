@@ -14,12 +14,19 @@ if TYPE_CHECKING:
 _PATIENCE = 2.0  # seconds of work before a bar appears
 _PERIOD = 0.1  # seconds between two drawings of the bar
 _WIDTH = 40  # characters
+WARNING = "warning: "
+"""How a line on stderr begins that is a reason not to rely on a result."""
 
 
 def note(text: str, quiet: bool = False) -> None:
     """Print a line on stderr unless `quiet`."""
     if not quiet:
         print(text, file=sys.stderr, flush=True)
+
+
+def warning(text: str, quiet: bool = False) -> None:
+    """Print a line on stderr, marked as a warning, unless `quiet`."""
+    note(f"{WARNING}{text}", quiet)
 
 
 @contextmanager

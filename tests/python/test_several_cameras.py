@@ -226,11 +226,14 @@ def test_a_second_camera_shows_how_far_the_person_is(tmp_path, monkeypatch, caps
                 "two.csv",
                 "--overlay",
                 "o.mp4",
+                "--json",
             ]
         )
         == 0
     )
-    assert "further film video_2.mp4: camera camera_2.json, began together" in capsys.readouterr().out
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["used"]["further film video_2.mp4"].startswith("camera camera_2.json, began together")
+    assert printed["offsets_s"] == [0]
     assert Video("o.mp4").size == (320, 120)
     assert main(["track", "video.mp4", *cameras[:2], *words, "-o", "one.csv"]) == 0
     truth = read_truth("truth.csv").eval15()

@@ -40,7 +40,7 @@ from gait.counts import count_of
 from gait.errors import UsageError, UserError
 from gait.io.files import replacing, require_outputs
 from gait.lift.smooth.options import METHODS, Options
-from gait.progress import note
+from gait.progress import warning
 
 if TYPE_CHECKING:
     from gait.bindings.segment_prior import SegmentPrior
@@ -321,7 +321,7 @@ def _lift_keypoints(args: argparse.Namespace, video: bool) -> tuple[dict[str, An
 
     _check(args, video)
     clips = _clips(args)
-    warn = partial(note, quiet=args.quiet)
+    warn = partial(warning, quiet=args.quiet)
     prior = lift_run.load_prior(args.model, warn)
     in_video = _detect(args, prior, args.input, args.camera) if video else None
     calibration = in_video.calibration if in_video else None
@@ -495,7 +495,7 @@ def _lift_pictures(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from gait.lift.detected import find_camera
     from gait.lift.video import run as video_run
 
-    warn = partial(note, quiet=args.quiet)
+    warn = partial(warning, quiet=args.quiet)
     prior, calibration = lift_run.load_prior(args.model, warn), None
     if args.height:
         calibration = find_camera(_request(args, args.input, None), prior, args.quiet)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gait.errors import UserError
 from gait.io.layouts import LAYOUTS, joint_named, points_of
-from gait.progress import note
+from gait.progress import warning
 
 Array = NDArray[np.float64]
 _T = TypeVar("_T")
@@ -103,7 +103,7 @@ def read_people(
         )
     people, anew = _people(detected.found)
     if anew:
-        note(
+        warning(
             f"{path}: people may have changed places before frame {', '.join(map(str, anew[:_NAMED]))}, "
             "after a gap; from there they count as others",
             clip.quiet,

@@ -27,7 +27,7 @@ from gait.io.detections import Clip
 from gait.io.detector_formats import KNOWN, Reader, reader_of
 from gait.io.fields import frame_numbers, table_rows
 from gait.io.files import replacing, require_no_device
-from gait.progress import note
+from gait.progress import warning
 
 Array = NDArray[np.float64]
 
@@ -220,7 +220,7 @@ def read(
     people, ignored = read_people(path, known, ignore_unknown, clip)
     person = next(iter(people))
     if len(people) > 1:
-        note(f"{path}: has {listed(people)}; took {person} (--person)", clip.quiet)
+        warning(f"{path}: has {listed(people)}; took {person} (--person)", clip.quiet)
     return people[person], ignored
 
 

@@ -11,7 +11,7 @@ from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Video, sample_frames
 from gait.lift.keypoints.corrections import read_corrections, read_edits
-from gait.progress import note
+from gait.progress import warning
 from gait.track.from_walk import Calibration
 from gait.track.stabilise import CameraTurns, find_turns, in_words, turn_in_samples
 from gait.track.walk_camera import calibrate_film, expected_camera, find_people, note_camera
@@ -104,7 +104,8 @@ def find_keypoints(request: Request, prior: SegmentPrior, quiet: bool) -> Detect
     if request.stabilize:
         turns = find_turns(video, camera, samples, people, None, quiet, first=given is not None)
     elif (turn := turn_in_samples(camera, samples, people)) != 0:
-        note(f"the camera {in_words(turn)} and counts as still: --stabilize auto estimates its turns", quiet)
+        how = in_words(turn)
+        warning(f"the camera {how} and counts as still: --stabilize auto estimates its turns", quiet)
     if turns is not None:
         people = {id: turns.in_reference(keypoints) for id, keypoints in people.items()}
     still = video if turns is None and turn == 0 else None

@@ -26,7 +26,7 @@ from gait.lift.smooth import motion, size
 from gait.lift.smooth.motion import Motion
 from gait.lift.smooth.options import Options
 from gait.lift.view_sides import best_sides
-from gait.progress import progress
+from gait.progress import note, progress
 from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
 from gait.track.synchronise import LONGEST_GAP_S, Film, no_shared_frame, same_person, synchronise
@@ -266,7 +266,7 @@ def lift_views(
         if films:
             _, offset, words = synchronise(films, film, given)
             began.append(offset.seconds)
-            named(words)
+            note(f"{path}: {words}", quiet)
         prepared.append(one)
         films.append(film)
     noise = [one.options.pixel_sd for one in prepared]

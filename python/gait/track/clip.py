@@ -16,7 +16,7 @@ from gait.bindings.initial import Start, set_height
 from gait.bindings.start_fit import StartFit
 from gait.io.trc import write_trc
 from gait.io.video import Frame
-from gait.progress import note, progress
+from gait.progress import note, progress, warning
 from gait.track.box_start import BoxStart
 from gait.track.clip_output import write
 from gait.track.follow import Follower
@@ -113,10 +113,10 @@ def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | N
     results = write(options, scene, tracker, found, plausibility, joints_found, also)
     report = RunReport(options, scene, used, tracker.config.particles)
     for frame, x, y in results.starts[1:]:
-        note(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
+        warning(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
     note("; ".join(results.coverage()), options.quiet)
     if results.hardly_followed():
-        note(f"{options.output}: {_HARDLY_FOLLOWED}")
+        warning(f"{options.output}: {_HARDLY_FOLLOWED}")
     if options.trc:
         times, joints = np.array(results.times), np.array(results.joints)
         write_trc(options.trc, scene.model.joint_names, times, joints, scene.video.fps)
@@ -124,7 +124,8 @@ def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | N
         assert results.film is not None
         report.write(options.report, results.film)
     camera = {} if scene.calibration is None else {"camera": scene.calibration.figures()}
-    return results.summary(options.threads, follower.step_seconds) | camera | report.figures()
+    began = {"offsets_s": list(scene.offsets)} if scene.further else {}
+    return results.summary(options.threads, follower.step_seconds) | camera | began | report.figures()
 
 
 def _stature(options: ClipOptions, scene: Scene, start: Start) -> tuple[float, float]:

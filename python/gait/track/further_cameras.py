@@ -121,7 +121,7 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
         scenes.append(one)
         offsets.append(offset.seconds)
     several = SeveralVideos(scene.video, [one.video for one in scenes], offsets)
-    return replace(scene, video=several, further=tuple(scenes), began=tuple(began))
+    return replace(scene, video=several, further=tuple(scenes), began=tuple(began), offsets=tuple(offsets))
 
 
 def _film(scene: Scene) -> Film[int]:

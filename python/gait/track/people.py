@@ -23,7 +23,7 @@ from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame
-from gait.progress import note, progress
+from gait.progress import note, progress, warning
 from gait.report.colours import PERSON_COLOURS
 from gait.report.drawing import Overlay
 from gait.report.film import Films, PageFilm
@@ -110,7 +110,7 @@ def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
             poses=scene.poses,
         )
         if found is None or not found.hypotheses[0].walks:
-            note(f"person {id} is not tracked: no second in which they walk in full view", options.quiet)
+            warning(f"person {id} is not tracked: no second in which they walk in full view", options.quiet)
         else:
             starts[id] = replace(found, source="the joints detected in the images")
     if not starts:

@@ -24,7 +24,7 @@ from gait.io import keypoints_file
 from gait.io.detections import Clip
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video, background, median, sample_frames
-from gait.progress import note, progress
+from gait.progress import note, progress, warning
 from gait.track.box_start import find_start
 from gait.track.camera_check import contradiction
 from gait.track.from_walk import Calibration
@@ -87,6 +87,8 @@ class Scene:
         The same walk filmed by further cameras; `video` contains their frames.
     began : tuple of str
         Time offset of each of these films, in words.
+    offsets : tuple of float
+        When each of them began, seconds after the first film.
     moved : str
         How the camera moves although it counts as still, in words; empty if it does not.
     against_camera : str
@@ -107,6 +109,7 @@ class Scene:
     outlines: dict[int, Outline] = field(default_factory=dict)
     further: tuple[Scene, ...] = ()
     began: tuple[str, ...] = ()
+    offsets: tuple[float, ...] = ()
     moved: str = ""
     against_camera: str = ""
 
@@ -273,7 +276,7 @@ def _camera_motion(
     how = in_words(turn)
     if not estimated:
         without = ", without a background" if options.background == "auto" else ""
-        note(
+        warning(
             f"the camera {how} and counts as still{without}: --stabilize auto estimates its motion, "
             "--camera-path gives its poses",
             options.quiet,
@@ -312,12 +315,12 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
         except UserError as error:
             raise UserError(scene.against_camera or str(error)) from error
     if scene.against_camera:
-        note(scene.against_camera, options.quiet)
+        warning(scene.against_camera, options.quiet)
     if options.init == "auto":
         _note_start(options, scene, start)
     wanted = options.detector == "auto" and not options.keypoints and options.mode != Mode.PAPER
     if wanted and not _has_detector(options):
-        note(f"without a detector start and track are less reliable: {weights.FETCH}", options.quiet)
+        warning(f"without a detector start and track are less reliable: {weights.FETCH}", options.quiet)
     return start
 
 
@@ -404,7 +407,7 @@ def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
     note(f"start found at frame {start.frame}: {start_words(start)}", options.quiet)
     if start.apparent_stature:
         remedy = "check --height and" if options.height else "give --height or check"
-        note(
+        warning(
             f"the person appears {start.apparent_stature:.2f} m tall by the camera, taken for "
             f"{start.mean.stature:.2f} m: {remedy} the camera",
             options.quiet,
@@ -480,7 +483,7 @@ def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
         raise UserError(
             f"{options.background}: {differs} it; give the empty scene of this camera, auto or none"
         )
-    note(
+    warning(
         f"{differs} the median of the clip, the background: if the camera moves, give --camera-path, "
         "--stabilize auto or --background none",
         options.quiet,
@@ -579,7 +582,7 @@ def _read_keypoints(options: ClipOptions, video: Video, model: Model, frames: ra
     clip = Clip(options.person, times=video.times, size=video.size, quiet=options.quiet)
     read, ignored = keypoints_file.read(options.keypoints, model.joint_names, ignore_unknown=True, clip=clip)
     if ignored:
-        note(f"ignored: {' '.join(ignored)}", options.quiet)
+        warning(f"ignored: {' '.join(ignored)}", options.quiet)
     read.require_extent(options.keypoints, options.keypoints_sd)
     read.require_inside(options.keypoints, video.size)
     if not any(frame in frames for frame in read.frame.tolist()):
@@ -587,5 +590,5 @@ def _read_keypoints(options: ClipOptions, video: Video, model: Model, frames: ra
             f"{options.keypoints}: has none of the tracked frames; number frames as in the video, from 0"
         )
     if words := read.compare_times(options.keypoints, video.times):
-        note(f"{options.keypoints}: {words}", options.quiet)
+        warning(f"{options.keypoints}: {words}", options.quiet)
     return replace(read, frame_sd=read.in_frame(options.keypoints_sd))

@@ -16,7 +16,7 @@ from gait.camera.camera import Camera
 from gait.camera.path import CameraPose
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
-from gait.progress import note, progress
+from gait.progress import note, progress, warning
 from gait.track.camera_motion import Box, CameraMotion, View, fit_view
 from gait.track.camera_travel import CameraTravel
 from gait.track.moving_video import map_pixels
@@ -150,7 +150,7 @@ def find_turns(
     with progress("camera's motion", video.count, quiet) as update:
         motion, why = find_motion(video, camera, samples, people, plate, update, first=first)
     if why:
-        note(f"{why}; its motion is ignored: give its poses with --camera-path", quiet)
+        warning(f"{why}; its motion is ignored: give its poses with --camera-path", quiet)
     if motion is None:
         return None
     place = "the background" if plate is not None else f"frame {motion.reference}"

@@ -11,7 +11,7 @@ from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.lens_tag import equivalent_mm, lens_tag, view_across
 from gait.io.video import Video
-from gait.progress import note, progress
+from gait.progress import note, progress, warning
 from gait.track.from_walk import Calibration, calibrate
 from gait.track.walk_start import GIVEN_FOV_SD, usual_camera
 
@@ -32,7 +32,7 @@ def find_people(video: Video, quiet: bool, first: int = 0, stop: int | None = No
 
     frames = video.span(first, stop)
     require_length(video, frames)
-    note(video.broken or "", quiet or not video.broken)
+    warning(video.broken or "", quiet or not video.broken)
     with progress("detecting", len(frames), quiet) as update:
         people = detect(video, first=first, stop=stop, update=update)
     require_person(people, video)
@@ -63,7 +63,7 @@ def expected_fov(video: Video, fov: float | None, quiet: bool) -> tuple[float | 
         return fov, GIVEN_FOV_SD
     mm = equivalent_mm(tag)
     if mm is None:
-        note(f"{video.path}: states a focal length of {tag[:20]!r}, which is not one: ignored", quiet)
+        warning(f"{video.path}: states a focal length of {tag[:20]!r}, which is not one: ignored", quiet)
         return None, GIVEN_FOV_SD
     fov = view_across(mm, video.size)
     note(
