@@ -36,16 +36,22 @@ if words[0] == "track":
         os.abort() if "crash" in words[1] else sys.exit(1)
     while "slow" in words[1] and not log.with_name("GO").exists():
         time.sleep(0.01)
-    out, one = Path(words[words.index("-o") + 1]), {"frames": 3, "tracking": 2, "digest": "x"}
+    out = Path(words[words.index("-o") + 1])
+    one = {"frames": 3, "init": 1, "tracking": 2, "digest": "x", "verdict": "Tracked <3>", "warning": "alone",
+           "notes": ["broken"], "offsets_s": [0.1234, -2]}
+    print("start found\\nwarning: camera.json: does not fit\\nwarning: broken", file=sys.stderr)
     people = "12" if "--people" in words else ""
     for path in [out.with_name(f"track-{k}.csv") for k in people] or [out]:
         path.write_text("frame\\n")
+    one = [] if "list" in words[1] else one
     print(json.dumps({"people": dict.fromkeys(people, one), "others": []} if people else one))
 elif words[:2] == ["report", "track"]:
     folder = Path(words[words.index("-o") + 1])
     folder.mkdir(exist_ok=True)
     (folder / "report.html").write_text("page")
-    print(json.dumps({"summary": {"speed_m_s": {"both": {"mean": 1.25, "sd": 0.1, "between": None}}}}))
+    both = {"mean": 1.25, "sd": 0.1, "between": None}
+    print("warning: short", file=sys.stderr)
+    print(json.dumps({"summary": {"speed_m_s": {"both": both}, "double_support_percent": {"both": None}}}))
 else:
     out = Path(words[words.index("-o") + 1])
     if out.suffix == ".bvh" and not log.with_name("GO").exists():
@@ -60,7 +66,7 @@ else:
 def place(tmp_path, monkeypatch):
     """A folder with the stand-in and clips."""
     (tmp_path / "fake.py").write_text(FAKE)
-    for name in ("a", "b", "slow", "bad", "badcrash"):
+    for name in ("a", "b", "slow", "bad", "badcrash", "list"):
         (tmp_path / f"{name}.mp4").write_bytes(name.encode())
     monkeypatch.setenv("FAKE_LOG", str(tmp_path / "log"))
     return tmp_path
@@ -108,7 +114,9 @@ def test_one_damaged_clip_never_ends_the_rest(place):
     assert rows[1]["error"] == "gait track: bad.mp4: damaged"
     assert "none.mp4: No such file" in rows[3]["error"]
     assert rows[0]["speed_m_s"] == 1.25 and rows[0]["tracking"] == 2 and rows[0]["subject"] == "Anna"
+    assert "double_support_percent" not in rows[0]  # null, as for a clip of few strides
     out = place / "out"
+    assert not (out / "bad").exists() and not (out / "none").exists()
     assert {file.name for file in (out / "a").iterdir()} == {"track.csv", "track.c3d", "report", "done.json"}
     assert write_summary(out, rows)[0] == "summary.csv"
     with open(out / "summary.csv", newline="") as file:
@@ -121,6 +129,32 @@ def test_one_damaged_clip_never_ends_the_rest(place):
         and "5 clips, 3 failed" in page
         and "http" not in page.split("<body")[1]
     )
+
+
+def test_figures_that_are_none_of_a_track_fail_the_clip_only(place):
+    """The stand-in prints a list for it."""
+    text = '[defaults]\nheight = 1.7\nmake = ["track"]\n'
+    clips = clips_of(place, text + '[[clip]]\nvideo = "list.mp4"\n[[clip]]\nvideo = "a.mp4"\n')
+    for _ in range(2):
+        rows = runner(place).run(clips, 1, lambda _: None)
+        assert [row["state"] for row in rows] == [FAILED, DONE]
+        assert re.fullmatch(r".*out/list: TypeError: .+", rows[0]["error"])
+
+
+def test_verdict_warnings_offsets_and_shares_are_shown(place):
+    """Warnings of the track and of its report, each once; other lines on stderr are no warnings."""
+    for _ in range(2):
+        rows = runner(place).run(clips_of(place, PROJECT), 1, lambda _: None)
+        assert rows[0]["warnings"] == "alone | broken | camera.json: does not fit | short"
+        assert (rows[0]["verdict"], rows[0]["offsets_s"]) == ("Tracked <3>", "0.123 -2.000")
+    write_summary(place / "out", rows)
+    with open(place / "out/summary.csv", newline="") as file:
+        assert next(csv.DictReader(file))["warnings"] == rows[0]["warnings"]
+    head, _, rest = (place / "out/index.html").read_text().partition("<tbody")
+    assert "<td>init 33%, tracking 67%</td><td>4</td>" in rest and "further films began" in head
+    assert "<p>a: Tracked &lt;3&gt;.</p>" in rest
+    assert '<p class="warning">a: camera.json: does not fit</p>' in rest
+    assert "sd, mm" not in head  # which no clip has
 
 
 def test_a_file_that_cannot_be_made_fails_the_clip_but_not_its_other_files(place):
@@ -170,14 +204,21 @@ def test_several_people_have_rows_and_files_of_their_own(place):
 def test_clips_are_counted_not_people(place, monkeypatch, capsys):
     clips_of(place, GROUP)
     monkeypatch.setattr(Runner.__init__, "__defaults__", (runner(place).gait,))
-    assert gait.cli.main(["batch", str(place / "p.toml"), "-o", str(place / "out")]) == 0
-    assert capsys.readouterr().out.startswith("1 clip, 0 failed")
+    words = ["batch", str(place / "p.toml"), "-o", str(place / "out")]
+    assert gait.cli.main(words) == 0
+    printed = capsys.readouterr()
+    assert printed.out.startswith("1 clip, 0 failed; ") and "a, person 2: done; Tracked <3>\n" in printed.err
+    assert "warning: a, person 2: camera.json: does not fit\n" in printed.err
+    assert gait.cli.main(words) == 0  # again
+    printed = capsys.readouterr()
+    assert printed.out.startswith("1 clip, 0 failed, 1 skipped; ")
+    assert "a, person 2: done, by an earlier run; skipped; Tracked <3>\n" in printed.err
 
 
 @pytest.mark.parametrize("make", ["track", "lift"])
 def test_several_films_are_one_clip_and_all_their_files_count(place, capsys, make):
     """gait track and gait lift take these words, and fail because the films have a few bytes only."""
-    (place / "calib.json").write_text("{}")
+    write_camera(place / "calib.json", view())
     text = (
         f'[[clip]]\nvideos = ["a.mp4", "b.mp4"]\ncameras = ["calib.json", "calib.json"]\nmake = ["{make}"]\n'
     )

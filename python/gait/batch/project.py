@@ -94,7 +94,7 @@ class Clip:
         return {path: [*words, "-o", str(path), "--json"] for path, words in made.items()}
 
     def _track(self, result: str, folder: Path) -> list[str]:
-        words = ["track", *self.videos, "-o", result, "--json", "--quiet", *self._common()]
+        words = ["track", *self.videos, "-o", result, "--json", *self._common()]
         if "overlay" in self.make:
             words += ["--overlay", str(folder / "overlay.mp4")]
         if self.keypoints:
@@ -103,7 +103,7 @@ class Clip:
 
     def _lift(self, result: str) -> list[str]:
         given = [self.keypoints] if self.keypoints else self.videos
-        words = ["lift", *given, "-o", result, "--json", "--quiet", *self._common()]
+        words = ["lift", *given, "-o", result, "--json", *self._common()]
         if self.keypoints and self.video:
             words += ["--video", self.video]
         return [*words, *self.options]

@@ -19,6 +19,7 @@ from typing import Any
 
 from gait.batch.project import Clip
 from gait.io.files import replacing
+from gait.progress import WARNING
 from gait.report.page import Page, movable
 from gait.signals import die_with_parent
 
@@ -27,7 +28,9 @@ RECORD = "done.json"  #: written to the folder of a clip that is tracked or lift
 GAIT_COMMAND = (sys.executable, "-m", "gait")
 _COUNTS = ("frames", "init", "tracking", "ambiguous", "lost")
 #: First columns of the summary; the others follow by name, so that failures do not change the order.
-_FIRST_COLUMNS = ("name", "subject", "person", "input", "state", "error", "seconds", *_COUNTS)
+_FIRST_COLUMNS = ("name", "subject", "person", "input", "state", "error", "seconds", *_COUNTS,
+                  "verdict", "warnings", "offsets_s")  # fmt: skip
+SEPARATOR = " | "  #: between the warnings of a clip
 _GRACE = 5.0  # seconds that commands have to end after an interrupt
 
 Row = dict[str, Any]
@@ -72,34 +75,47 @@ class Runner:
         """Run one clip unless it is done already; return its row of the summary, or that of each person."""
         folder = self.output / clip.name
         try:
+            if before := self.before(clip):
+                return before
             key = clip.key()
-            if before := self._recorded(folder, key, "rows"):
-                return list(before)
             folder.mkdir(parents=True, exist_ok=True)
             began = time.monotonic()
             found = self._recorded(folder, key, "found") or self._command(clip.command(folder))
             people = {None: found} if clip.people is None else found["people"]
-            rows = [self._row(clip, folder, person, own) for person, own in people.items()]
+            shared = {"warnings": found.get("warnings", [])}
+            rows = [self._row(clip, folder, person, own | shared) for person, own in people.items()]
             rows = [row | {"seconds": round(time.monotonic() - began, 1)} for row in rows]
             record = {"key": key, "found": found} | ({} if _failed(rows) else {"rows": rows})
             with replacing(folder / RECORD) as file:
                 file.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-        except OSError as error:
-            return [failed(clip, f"{error.filename}: {error.strerror}")]
-        except _Failed as error:
-            return [failed(clip, str(error))]
+        except Exception as error:  # whatever it is, the other clips continue
+            if folder.is_dir() and not any(folder.iterdir()):
+                folder.rmdir()
+            return [failed(clip, _reason(error, folder))]
         return rows
+
+    def before(self, clip: Clip) -> list[Row]:
+        """Return the rows of a clip that an earlier run has done, empty if none has.
+
+        OSError if a file of the clip cannot be found.
+        """
+        return list(self._recorded(self.output / clip.name, clip.key(), "rows") or ())
 
     def _row(self, clip: Clip, folder: Path, person: str | None, found: Any) -> Row:
         """Make the files that follow from a track or a motion; return its row, with the first failure."""
         row, errors = _begun(clip) | ({} if person is None else {"person": int(person)}), []
         row |= _figures("lift" if clip.lifted else "track", found)
+        warnings = [found["warning"]] if found.get("warning") else []
+        warnings += [*found.get("notes", ()), *found["warnings"]]
         for target, command in clip.further(folder, person).items():
             try:
-                row |= _figures(command[0], self._command(command))
+                made = self._command(command)
+                row |= _figures(command[0], made)
+                warnings += made["warnings"]
             except _Failed as error:
                 errors.append(str(error))
                 _remove(target)
+        row["warnings"] = SEPARATOR.join(dict.fromkeys(warnings))  # each once
         return row | {"state": FAILED if errors else DONE, "error": errors[0] if errors else ""}
 
     def _recorded(self, folder: Path, key: str, what: str) -> Any:
@@ -114,7 +130,10 @@ class Runner:
         return record.get(what) if isinstance(record, dict) and record.get("key") == key else None
 
     def _command(self, words: Sequence[str]) -> Any:
-        """Run a command and return the JSON that it prints; _Failed, with its last line, if it fails."""
+        """Run a command; return the JSON that it prints and, by the name ``warnings``, its warnings.
+
+        _Failed, with its last line, if it fails.
+        """
         with self._lock:
             if self._ended:
                 raise _Failed("interrupted")
@@ -133,11 +152,13 @@ class Runner:
             self._running.discard(process)
         if process.returncode:
             last = next((line for line in reversed(err.splitlines()) if line.strip()), "")
-            raise _Failed(last or f"gait {words[0]} ended with {process.returncode}")
+            raise _Failed(last.removeprefix(WARNING) or f"gait {words[0]} ended with {process.returncode}")
         try:
-            return json.loads(out)
+            found = json.loads(out)
         except ValueError:
             raise _Failed(f"gait {words[0]} printed no figures") from None
+        lines = [line.removeprefix(WARNING) for line in err.splitlines() if line.startswith(WARNING)]
+        return found | {"warnings": lines}
 
     def _end(self) -> None:
         """End the running commands, and start no more."""
@@ -162,6 +183,15 @@ def failed(clip: Clip, error: str) -> Row:
     return _begun(clip) | {"state": FAILED, "error": error}
 
 
+def _reason(error: Exception, folder: Path) -> str:
+    """Name in one line why a clip failed."""
+    if isinstance(error, _Failed):
+        return str(error)
+    if isinstance(error, OSError):
+        return f"{error.filename or folder}: {error.strerror or error}"
+    return f"{folder}: {type(error).__name__}: {' '.join(str(error).split())}"
+
+
 def _remove(path: Path) -> None:
     """Remove a file or folder of an earlier run."""
     if path.is_dir():
@@ -177,14 +207,22 @@ class _Failed(Exception):
 def _figures(command: str, found: Any) -> Row:
     """Choose the figures for the summary from a command's JSON."""
     if command == "track":
-        return {name: found[name] for name in _COUNTS if name in found}
+        return {name: found[name] for name in (*_COUNTS, "verdict") if name in found} | _offsets(found)
     if command == "lift":
-        return {name: found[name] for name in ("frames", "sd_mm", "stature_m") if found.get(name) is not None}
+        names = ("frames", "sd_mm", "stature_m")
+        return {name: found[name] for name in names if found.get(name) is not None} | _offsets(found)
     if command == "report":
-        both = {name: values["both"] for name, values in found["summary"].items() if "both" in values}
+        # null: too few strides
+        both = {name: own["both"] for name, own in found["summary"].items() if own.get("both") is not None}
         return {f"{name}{end}": value[part] for name, value in both.items()
                 for end, part in (("", "mean"), ("_sd", "sd"))}  # fmt: skip
     return {}
+
+
+def _offsets(found: Any) -> Row:
+    """Return when further films began, seconds after the first, separated by spaces; nothing for one film."""
+    offsets = found.get("offsets_s", ())
+    return {"offsets_s": " ".join(f"{seconds:.3f}" for seconds in offsets)} if offsets else {}
 
 
 def write_summary(output: Path, rows: Sequence[Row]) -> list[str]:
@@ -211,8 +249,9 @@ def write_summary(output: Path, rows: Sequence[Row]) -> list[str]:
 
 
 _SHOWN = {
-    **{"subject": "subject", "state": "state", "frames": "frames", "speed_m_s": "speed, m/s"},
-    **{"cadence_spm": "steps a minute", "stride_length_m": "stride, m"},
+    **{"subject": "subject", "state": "state", "frames": "frames", "status": "status of frames"},
+    **{"warnings": "warnings", "speed_m_s": "speed, m/s", "cadence_spm": "steps a minute"},
+    **{"stride_length_m": "stride, m", "sd_mm": "sd, mm", "offsets_s": "further films began, s"},
 }
 
 
@@ -220,18 +259,33 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
     """Page with a row for each clip and links to its files."""
     clips, failed = (len({row["name"] for row in found}) for found in (rows, _failed(rows)))
     page = Page("Clips", f"{clips} clip{'s' * (clips > 1)}, {f'{failed} failed' if failed else 'all done'}.")
-    head = "".join(f"<th scope=col>{escape(text)}</th>" for text in ("clip", *_SHOWN.values()))
+    cells = [{name: _shown(row, name) for name in _SHOWN} for row in rows]
+    shown = [name for name in _SHOWN if any(row[name] for row in cells)]
+    head = "".join(
+        f"<th scope=col>{escape(text)}</th>" for text in ("clip", *(_SHOWN[name] for name in shown))
+    )
     body = "".join(
-        f"<tr><th scope=row>{escape(row['name'])}{f', person {n}' if (n := row.get('person')) else ''}</th>"
-        + "".join(f"<td>{escape(_shown(row, name))}</td>" for name in _SHOWN)
+        f"<tr><th scope=row>{escape(_called(row))}</th>"
+        + "".join(f"<td>{escape(own[name])}</td>" for name in shown)
         + f"<td class=links>{_links(output, row)}</td></tr>"
-        for row in rows
+        for row, own in zip(rows, cells, strict=True)
     )
     table = f"<thead><tr>{head}<th scope=col class=links>files</th></tr></thead><tbody>{body}</tbody></table>"
-    page.html(movable(f'<table class="grid" style="--columns: {len(_SHOWN)}">{table}'))
-    for row in _failed(rows):
-        page.words(f"{row['name']}: {row['error']}", "warning")
+    page.html(movable(f'<table class="grid" style="--columns: {len(shown)}">{table}'))
+    for row in rows:
+        if row.get("verdict"):
+            page.words(f"{_called(row)}: {row['verdict']}.")
+        for words in filter(None, (row["error"], *_warnings(row))):
+            page.words(f"{_called(row)}: {words}", "warning")
     return page.text()
+
+
+def _called(row: Mapping[str, Any]) -> str:
+    return f"{row['name']}, person {row['person']}" if row.get("person") else str(row["name"])
+
+
+def _warnings(row: Mapping[str, Any]) -> list[str]:
+    return [words for words in row.get("warnings", "").split(SEPARATOR) if words]
 
 
 def _failed(rows: Sequence[Row]) -> list[Row]:
@@ -239,6 +293,11 @@ def _failed(rows: Sequence[Row]) -> list[Row]:
 
 
 def _shown(row: Mapping[str, Any], name: str) -> str:
+    if name == "warnings":
+        return str(len(_warnings(row)) or "")
+    if name == "status":
+        counts = {status: row[status] for status in _COUNTS[1:] if row.get(status)}
+        return ", ".join(f"{status} {count / row['frames']:.0%}" for status, count in counts.items())
     value = row.get(name)
     return "" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
 

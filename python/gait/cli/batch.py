@@ -34,11 +34,16 @@ import argparse
 import json
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from gait.cli import values
 from gait.errors import UsageError
 from gait.io.files import require_folder
-from gait.progress import note
+from gait.progress import note, warning
+
+if TYPE_CHECKING:
+    from gait.batch.project import Clip
+    from gait.batch.run import Runner
 
 EXAMPLES = """\
 examples:
@@ -66,7 +71,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run all clips and summarise."""
     from gait.batch import project
-    from gait.batch.run import FAILED, Runner, write_summary  # reports missing extras before any clip is run
+    from gait.batch.run import (
+        FAILED,
+        SEPARATOR,
+        Runner,
+        write_summary,
+    )  # reports missing extras before any clip is run
 
     if args.dask and args.jobs:
         raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
@@ -75,24 +85,41 @@ def run(args: argparse.Namespace) -> int:
     output = Path(args.output)
     output.mkdir(parents=True, exist_ok=True)
 
-    def report(row: dict[str, object]) -> None:
+    runner = Runner(output)
+    before = {clip.name for clip in clips if _done(runner, clip)}
+
+    def report(row: dict[str, Any]) -> None:
+        name = f"{row['name']}, person {row['person']}" if row.get("person") else row["name"]
         error = f": {row['error']}" if row["error"] else ""
-        note(f"{row['name']}: {row['state']}{error}", args.quiet)
+        skipped = ", by an earlier run; skipped" if row["name"] in before else ""
+        verdict = f"; {row['verdict']}" if row.get("verdict") else ""
+        note(f"{name}: {row['state']}{error}{skipped}{verdict}", args.quiet)
+        for words in row.get("warnings", "").split(SEPARATOR):
+            warning(f"{name}: {words}", args.quiet or not words)
 
     if args.dask:
         from gait.batch import cluster  # needs extra dask
 
         rows = cluster.run(output, clips, args.dask, report)
     else:
-        rows = Runner(output).run(clips, args.jobs or _usual_jobs(), report)
+        rows = runner.run(clips, args.jobs or _usual_jobs(), report)
     names = write_summary(output, rows)
     failed = sum(row["state"] == FAILED for row in rows)  # with one row each
     if args.json:
         print(json.dumps({"clips": len(clips), "failed": failed, "rows": rows}))
     else:
         files = ", ".join(str(output / name) for name in names)
-        print(f"{len(clips)} clip{'s' * (len(clips) > 1)}, {failed} failed; {files}")
+        skipped = f", {len(before)} skipped" if before else ""
+        print(f"{len(clips)} clip{'s' * (len(clips) > 1)}, {failed} failed{skipped}; {files}")
     return int(failed > 0)
+
+
+def _done(runner: Runner, clip: Clip) -> bool:
+    """Whether an earlier run has done a clip."""
+    try:
+        return bool(runner.before(clip))
+    except OSError:
+        return False
 
 
 def _usual_jobs() -> int:
