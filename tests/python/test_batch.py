@@ -331,6 +331,14 @@ def test_an_interrupt_ends_the_commands(place):
     assert not (place / "out/slow/track.csv").exists() and not (place / "out/slow/done.json").exists()
 
 
+OPTIONS = "[[clip]]\nvideo = 'a.mp4'\nheight = 1.7\noptions = [{}]\n"
+
+
+def test_options_that_no_key_gives_are_taken(place):
+    [clip] = clips_of(place, OPTIONS.format('"--stop", "50", "--offsets", "-0.1"'))
+    assert clip.command(place)[-4:] == ["--stop", "50", "--offsets", "-0.1"]
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -365,6 +373,21 @@ def test_an_interrupt_ends_the_commands(place):
         (
             "[defaults]\nstop = 9\n[[clip]]\nkeypoints = 'k.json'\nmake = ['lift']\n",
             r"clip 1: stop is for a film, .*leave out stop here and in \[defaults\]",
+        ),
+        (
+            OPTIONS.format('"-o", "weg.csv"'),
+            "p.toml: clip 1: options has '-o', which .* itself; leave it out",
+        ),
+        (OPTIONS.format('"-oweg.csv"'), "options has '-oweg.csv', which"),
+        (OPTIONS.format('"--out=weg.csv"'), "options has '--out=weg.csv', which"),
+        (OPTIONS.format('"--json"'), "options has '--json', which .*; leave it out"),
+        (
+            OPTIONS.format('"--people", "all"'),
+            "options has '--people', which .*; give the key people instead",
+        ),
+        (
+            OPTIONS.format('"--height=1.8"'),
+            "options has '--height=1.8', which .*; give the key height instead",
         ),
         ("[[clip]\n", "not valid TOML"),
     ],

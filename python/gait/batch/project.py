@@ -210,6 +210,18 @@ def _require(fields: Fields, clip: Clip) -> None:
             raise fields.fail(name, why, f"leave out {name} here and in [defaults], and give it to each film")
     if not clip.cameras and clip.height is None and not (clip.lifted and clip.keypoints):
         raise fields.fail("camera", "and height are missing", "give one of them, here or in [defaults]")
+    _require_options(fields, clip)
+
+
+def _require_options(fields: Fields, clip: Clip) -> None:
+    """Raise UserError if `options` has an option that the clip's command line has without it."""
+    own = {word for word in replace(clip, options=()).command(Path()) if word.startswith("-")}
+    for word in clip.options:
+        name = word.partition("=")[0]
+        output = word.startswith("-o") or (len(name) > 3 and "--output".startswith(name))
+        if output or name in own | {"--people", "--quiet"}:
+            remedy = f"give the key {name[2:]} instead" if name[2:] in _KEYS else "leave it out"
+            raise fields.fail("options", f"has {word!r}, which gait batch sets itself", remedy)
 
 
 def _text(fields: Fields, name: str) -> str:
