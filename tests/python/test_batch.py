@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from walking_keypoints import keypoints, view
+from walking_keypoints import SIZE, keypoints, view
 
 import gait.cli
 from gait.batch import project
 from gait.batch.run import DONE, FAILED, Runner, write_summary
-from gait.camera.camera import write_camera
+from gait.camera.camera import Camera, write_camera
 from gait.errors import UserError
 from gait.io.keypoints_file import write
 
@@ -371,6 +371,15 @@ def test_options_that_no_key_gives_are_taken(place):
         ),
         ("[[clip]]\nvideos = ['a.mp4', 'b.mp4']\nheight = 1.7\n", "cameras are missing; give the camera of"),
         (
+            "[[clip]]\nkeypoints = ['k.csv', 'l.csv']\nmake = ['lift']\n",
+            "cameras are missing; give the camera of",
+        ),
+        (
+            "[[clip]]\nkeypoints = ['k.csv', 'l.csv']\nvideo = 'a.mp4'\nheight = 1.7\n",
+            "keypoints are several",
+        ),
+        ("[[clip]]\nkeypoints = [1]\nmake = ['lift']\n", r"keypoints is not a list.*left.csv"),
+        (
             "[defaults]\nstop = 9\n[[clip]]\nkeypoints = 'k.json'\nmake = ['lift']\n",
             r"clip 1: stop is for a film, .*leave out stop here and in \[defaults\]",
         ),
@@ -396,6 +405,24 @@ def test_a_project_that_cannot_be_right_is_one_line(text, words, place):
     with pytest.raises(UserError, match=words) as caught:
         clips_of(place, text)
     assert "\n" not in str(caught.value)
+
+
+def test_keypoints_of_several_views_are_lifted_together(tmp_path, capsys):
+    """As gait lift would; a changed file of the second view counts."""
+    for name, at in (("a", view()), ("b", Camera.looking((6.0, 5.0, 1.6), (0.3, 5.5, 0.9), SIZE, 1000.0))):
+        write_camera(tmp_path / f"{name}.json", at)
+        write(tmp_path / f"{name}.csv", keypoints(at, seconds=1.6))
+    (tmp_path / "p.toml").write_text(
+        '[[clip]]\nkeypoints = ["a.csv", "b.csv"]\ncameras = ["a.json", "b.json"]\nmake = ["lift"]\n'
+        'options = ["--offsets", "0"]\n'
+    )
+    assert gait.cli.main(["batch", str(tmp_path / "p.toml"), "-o", str(tmp_path / "out"), "--json"]) == 0
+    [row] = json.loads(capsys.readouterr().out)["rows"]
+    assert (row["name"], row["frames"], row["offsets_s"]) == ("a", 24, "0.000")
+    [clip] = project.read(tmp_path / "p.toml")
+    before = clip.key()
+    (tmp_path / "b.csv").write_text("")
+    assert clip.key() != before
 
 
 def test_the_command_lifts_keypoints_and_exports_them(tmp_path, capsys):

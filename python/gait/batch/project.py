@@ -35,7 +35,7 @@ class Clip:
 
     name: str
     videos: tuple[str, ...] = ()  #: several: the same walk, each with its camera
-    keypoints: str | None = None
+    keypoints: tuple[str, ...] = ()  #: several: of the same walk, each with its camera
     cameras: tuple[str, ...] = ()
     subject: str = ""  #: the person's name, for the summary
     height: float | None = None  #: metres
@@ -66,8 +66,7 @@ class Clip:
 
         Files named in `options` count, and all files in a folder of keypoints.
         """
-        paths = [*self.videos, *(split_name(camera)[0] for camera in self.cameras)]
-        paths += [self.keypoints] if self.keypoints else []
+        paths = [*self.videos, *(split_name(camera)[0] for camera in self.cameras), *self.keypoints]
         named = (word.partition("=")[2] if word.startswith("--") else word for word in self.options)
         paths += [path for path in named if os.path.exists(path)]
         paths += sorted(entry.path for path in paths if os.path.isdir(path) for entry in os.scandir(path))
@@ -98,11 +97,11 @@ class Clip:
         if "overlay" in self.make:
             words += ["--overlay", str(folder / "overlay.mp4")]
         if self.keypoints:
-            words += ["--keypoints", self.keypoints]
+            words += ["--keypoints", *self.keypoints]
         return [*words, *self.options]
 
     def _lift(self, result: str) -> list[str]:
-        given = [self.keypoints] if self.keypoints else self.videos
+        given = self.keypoints or self.videos
         words = ["lift", *given, "-o", result, "--json", *self._common()]
         if self.keypoints and self.video:
             words += ["--video", self.video]
@@ -158,7 +157,9 @@ def _clip(fields: Fields, common: Clip, folder: Path, named: bool = False) -> Cl
         if name in fields:
             given[name] = _text(fields, name)
     if "keypoints" in fields:
-        given["keypoints"] = str(folder / _text(fields, "keypoints"))
+        several = isinstance(fields.get("keypoints", ""), list)
+        files = _words(fields, "keypoints", None) if several else (_text(fields, "keypoints"),)
+        given["keypoints"] = tuple(str(folder / file) for file in files)
     for one, several in _FILES.items():
         if one in fields and several in fields:
             raise fields.fail(several, f"is given beside {one}", "leave out one of them")
@@ -181,7 +182,7 @@ def _clip(fields: Fields, common: Clip, folder: Path, named: bool = False) -> Cl
         if name in fields:
             given[name] = _words(fields, name, known)
     if named:
-        stem = Path(next(iter(given.get("videos", ())), given.get("keypoints", ""))).stem
+        stem = Path(next(iter((*given.get("videos", ()), *given.get("keypoints", ()))), "")).stem
         given["name"] = _text(fields, "name") if "name" in fields else stem
     return replace(common, **given)
 
@@ -198,8 +199,10 @@ def _require(fields: Fields, clip: Clip) -> None:
         raise fields.fail("make", "has lift together with track, overlay or report", "make a clip of each")
     if len(clip.videos) > 1 and clip.keypoints:
         raise fields.fail("videos", "cannot be combined with keypoints", "give video, or leave out keypoints")
-    if len(clip.videos) > 1 and not clip.cameras:
-        raise fields.fail("cameras", "are missing", "give the camera of each film, here or in [defaults]")
+    if len(clip.keypoints) > 1 and (clip.video or not clip.lifted):
+        raise fields.fail("keypoints", "are several", "make lift, without a video, or give one file")
+    if max(len(clip.videos), len(clip.keypoints)) > 1 and not clip.cameras:
+        raise fields.fail("cameras", "are missing", "give the camera of each view, here or in [defaults]")
     if clip.people and (clip.lifted or clip.keypoints):
         raise fields.fail(
             "people", "cannot be combined with lift or keypoints", "several people are tracked in a video"
@@ -235,6 +238,7 @@ _EXAMPLES = {
     "make": '["track", "report"]',
     "options": '["--detector", "lite"]',
     "videos": '["left.mp4", "right.mp4"]',
+    "keypoints": '["left.csv", "right.csv"]',
     "cameras": '["left.json", "right.json"]',
 }
 

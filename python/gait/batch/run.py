@@ -175,7 +175,7 @@ class Runner:
 
 
 def _begun(clip: Clip) -> Row:
-    return {"name": clip.name, "subject": clip.subject, "input": clip.video or clip.keypoints}
+    return {"name": clip.name, "subject": clip.subject, "input": (*clip.videos, *clip.keypoints)[0]}
 
 
 def failed(clip: Clip, error: str) -> Row:

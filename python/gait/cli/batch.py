@@ -15,7 +15,7 @@ PROJECT.toml lists the clips and the outputs of each; paths are relative to it:
   videos = ["left.mp4", "right.mp4"]  # films of one walk
   camera = "calibration.toml"         # of all of them; or cameras = ["left.json", "right.json"]
   [[clip]]
-  keypoints = "ben.json"
+  keypoints = "ben.json"        # or ["left.csv", "right.csv"], of one walk, with cameras, to lift together
   make = ["lift", "mot"]
   options = ["--fps", "30"]     # further options of gait track or gait lift
 
