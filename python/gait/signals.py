@@ -24,6 +24,15 @@ def die_with_parent() -> None:
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
+def end_undisturbed() -> None:
+    """Ignore the signals that end a command from now on, as when a program has done its work.
+
+    While Python unloads its modules, one would end the process as if the work had been interrupted.
+    """
+    for number in ending_signals():
+        signal.signal(number, signal.SIG_IGN)
+
+
 class Interruptible:
     """Within this block the signals that end a command raise KeyboardInterrupt.
 

@@ -64,6 +64,18 @@ def test_track_keeps_the_rows_that_are_finished(tmp_path):
     assert 1 <= rows < 900 and abs(Video(output / "o.unfinished.mp4").count - rows) <= 1
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_after_the_work_changes_nothing(number):
+    """As a second Ctrl-C, or the second signal that timeout sends, while Python unloads its modules."""
+    buffered = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    words = [sys.executable, "-m", "gait", "info", MODEL, "--json"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=buffered) as process:
+        assert process.stdout.readline().startswith(b"{")
+        while process.poll() is None:
+            process.send_signal(number)
+        assert (process.returncode, process.stderr.read()) == (0, b"")
+
+
 def test_a_reader_that_leaves_is_no_error_of_ours():
     quiet = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
     words = [sys.executable, "-m", "gait", "info", MODEL]

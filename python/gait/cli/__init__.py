@@ -23,7 +23,7 @@ from typing import NamedTuple, NoReturn
 from gait import extras, reproducible
 from gait._version import __version__
 from gait.errors import GaitError, UsageError, UserError
-from gait.signals import Interruptible
+from gait.signals import Interruptible, end_undisturbed
 
 
 class Command(NamedTuple):
@@ -89,8 +89,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         with Interruptible(ignored=True):
             args = _parse(words)
             code = int(args.run(args))
-            sys.stdout.flush()  # at exit, Python would report a closed pipe
-            return code
+        if argv is None:  # the program ends here: a second Ctrl-C must not change its exit code
+            end_undisturbed()
+        sys.stdout.flush()  # at exit, Python would report a closed pipe
+        return code
     except UsageError as exc:
         _failed(command, str(exc))
         return 2
