@@ -271,20 +271,23 @@ def test_ends_that_cannot_be_are_usage_errors(tmp_path, option):
 
 
 def test_a_log_for_which_there_is_no_space_is_reported(estimates, tmp_path):
-    """The last bytes are still in memory: only closing the file shows that they do not fit."""
+    """The last bytes are still in memory: only closing the file shows that they do not fit.
+
+    The name, which some programs give to logs, is taken as well.
+    """
     log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
     space = log.stat().st_size - 100
     words = [str(rig.PYTHON), "-m", "gait", "record", "--url", f"file://{log}?speed=0"]
     done = subprocess.run(
-        [*words, "-o", tmp_path / "t.csv", "--log", tmp_path / "e.log"],
+        [*words, "-o", tmp_path / "t.csv", "--log", tmp_path / "e.lcm"],
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (space, space)),
         capture_output=True,
         text=True,
         timeout=rig.PATIENCE,
         check=False,
     )
-    assert done.returncode == 1 and "e.log: the log cannot be written: File too large" in done.stderr
-    assert not (tmp_path / "e.log").exists()
+    assert done.returncode == 1 and "e.lcm: the log cannot be written: File too large" in done.stderr
+    assert not (tmp_path / "e.lcm").exists()
 
 
 def states_too_much(content, begin, length=2**31 - 1):

@@ -26,8 +26,8 @@ EXAMPLES = """\
 examples:
   gait export track.csv -o walk.c3d
   gait export motion.csv -o walk.mot
-  gait export session.lcm -o session.mcap
-  gait export session.lcm -o session.mcap --ros2
+  gait export session.log -o session.mcap
+  gait export session.log -o session.mcap --ros2
 """
 
 

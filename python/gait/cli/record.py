@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--lagged", action="store_true", help="record the lagged estimate of each frame (gait-trackd --lag)")
     add(
         "--log",
-        type=values.named(".log"),
+        type=values.named(".log", ".lcm"),
         metavar="E.log",
         help="also write the messages to an LCM log, for gait report",
     )
