@@ -70,6 +70,18 @@ def test_a_log_can_be_added_to(folder, tmp_path):
     assert len(rig.read_log(log, "GAIT_IMAGE_0", gaitmsg.image_t)) == 2 * COUNT
 
 
+def test_films_that_begin_at_one_time_have_the_same_stamps(folder, tmp_path):
+    stamps = []
+    for stream in "01":
+        log = tmp_path / f"{stream}.log"
+        done = rig.gait(
+            *words_of(folder, f"file://{log}?mode=w"), "--stream", stream, "--begin-at", "1800000000.25"
+        )
+        assert done.returncode == 0, done.stderr
+        stamps.append([m.utime for m in rig.read_log(log, f"GAIT_IMAGE_{stream}", gaitmsg.image_t)])
+    assert stamps[0] == stamps[1] and stamps[0][0] == 1_800_000_000_250_000 and len(stamps[0]) == COUNT
+
+
 @pytest.mark.parametrize("mode", ["", "?speed=0", "?mode=r", "?mode=write"])
 def test_a_log_without_the_mode_of_writing_is_refused(folder, tmp_path, mode):
     log = rig.write_log(tmp_path / "x.log", rig.opening())

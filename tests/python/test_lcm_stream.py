@@ -117,6 +117,14 @@ def test_delays_do_not_add_up():
     assert pacer.late == pytest.approx(1 / 30, abs=1e-9)
 
 
+def test_the_first_frame_is_due_at_its_time():
+    """Whatever video time it has."""
+    clock, at = Clock(), 1_800_000_000_250_000
+    pacer = Pacer(None, 4.0, 5.0, at, clock=clock, sleep=clock.sleep)
+    pacer.wait(4.0)
+    assert pacer.utime(4.0) == at and pacer.utime(4.5) == at + 500_000 and clock.now == 105.0
+
+
 def test_rates():
     times = np.arange(10) / 30
     np.testing.assert_allclose(paced("10", times, np.zeros(10))[1], np.arange(10) / 10, atol=1e-9)
@@ -173,12 +181,15 @@ def test_repetition_goes_on_counting(folder):
         (["--init", "auto", "--start", "2", "--stop", "5"], 1, "only 3 frames to track"),
         (["--camera", "nothing.json"], 1, "nothing.json"),
         (["--wait", "0.6"], 1, "no tracker knows the camera after 0.6 s"),
+        (["--begin-at", "1e9", "--url", "udpm://239.255.76.67:7701?ttl=0"], 1, "--begin-at: passed "),
+        (["--begin-at", "1.8e12"], 2, "--begin-at 1.8e+12: give seconds since 1970"),
+        (["--begin-at", "-1"], 2, "-1: give seconds from 0 up"),
         (["--wait", "nan"], 2, "nan: give seconds from 0 up"),
         (["--wait", "1", "--url", "file://x.log?mode=w"], 2, "--wait: no tracker listens to the log"),
     ],
 )
 def test_faults_of_capture_are_one_line(folder, options, code, words):
-    if "0.6" in options:
+    if {"0.6", "1e9"} & set(options):
         rig.need_multicast()
         options = [*options, "--url", link.private_url()]
     done = rig.gait("capture", *capture_options(folder), "--quiet", *options)

@@ -1,14 +1,20 @@
 """Send the frames of a video file, a camera or a network stream over LCM, as a camera in the field would.
 
-A file is sent at its recorded rate, with time stamps that start now.  Each frame has its number, so that
-receivers can count missed frames.  Calibration and empty scene are announced at the start and every two
-seconds.  With --init the tracker gets a START for the right frame.
+A file is sent at its recorded rate, with time stamps that start now, or at --begin-at: two files of one scene
+need the same --begin-at, a few seconds from now, as each would start at its own time.  Each frame has its
+number, so that receivers can count missed frames.  Calibration and empty scene are announced at the start
+and every two seconds.  With --init the tracker gets a START for the right frame.
+
+Time stamps advance as in the file, whatever the --rate: at another rate than the true one, latencies and
+rates that receivers derive from them are not those of the machine.
 
 --wait makes sure that a tracker is listening: the stream begins when gait-trackd has confirmed the camera,
 the empty scene and START.  Without it the stream begins at once.  With trackers of several people, --person N
 sends START to that of person N.
 
---url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd replays without loss.
+--url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd replays without loss, and ?mode=a
+appends to one.  A log is replayed in the order of its messages, so a film of a second camera cannot come after
+that of the first: send both at once, with --begin-at, and record them with lcm-logger.
 
 If a stream (RTSP, HTTP) breaks, the command reconnects within seconds; frames are stamped as they arrive.
 
@@ -46,6 +52,9 @@ examples:
 """
 
 
+_LATEST = 1e11  # seconds; milliseconds since 1970 are more
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add = parser.add_argument
@@ -68,6 +77,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="true",
         metavar="true|max|HZ",
         help="frames per second to send: the true rate (default), max, or a number",
+    )
+    add(
+        "--begin-at",
+        type=values.seconds,
+        metavar="T",
+        help="capture time of a file's first frame, seconds since 1970 (date +%%s); default: now",
     )
     add("--jpeg", type=values.whole(1, 100), metavar="Q", help="compress frames with this quality, 1 to 100")
     add("--grey", action="store_true", help="send grey frames")
@@ -117,6 +132,8 @@ def _require_sense(args: argparse.Namespace, url: str) -> None:
         raise UsageError("--height: is for --init; give an init file, or auto")
     if args.person is not None and not (args.init or args.wait > 0):
         raise UsageError("--person: is for --init and --wait; frames are everyone's")
+    if args.begin_at is not None and args.begin_at > _LATEST:
+        raise UsageError(f"--begin-at {args.begin_at:g}: give seconds since 1970")
     if not is_log(url):
         return
     if args.wait > 0:
@@ -164,9 +181,11 @@ def _source(args: argparse.Namespace) -> FileSource | DeviceSource:
     stream = is_stream(args.source)
     if not stream and not is_device(args.source):
         return FileSource(args.source, args.start, args.stop, grey=args.grey, loop=args.loop)
-    if args.start or args.stop is not None or args.loop or args.rate != "true" or args.background == "auto":
+    timed = args.start or args.stop is not None or args.begin_at is not None
+    if timed or args.loop or args.rate != "true" or args.background == "auto":
         raise UsageError(
-            f"{args.source}: is a camera: --start --stop --loop --rate and --background auto are for files"
+            f"{args.source}: is a camera: --start --stop --begin-at --loop --rate and --background auto are "
+            f"for files"
         )
     if stream:
         return StreamSource(args.source, grey=args.grey, quiet=args.quiet)
@@ -182,6 +201,7 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
     from gait.lcm.capture import DeviceSource, FileSource, Setup
 
     setup = Setup(stream=args.stream, jpeg=args.jpeg, person=args.person)
+    setup.begin_at = None if args.begin_at is None else round(1e6 * args.begin_at)
     if args.camera and not args.camera_path:
         setup.camera = Camera.read(args.camera, source.size, args.scale_camera)
     if args.camera_path:

@@ -131,6 +131,8 @@ class Pacer:
         Video time of the first frame, seconds.
     lead : float
         Seconds from now until the first frame is due.
+    at : int, optional
+        Capture time of the first frame, microseconds since the Unix epoch; None: when it is due.
 
     Attributes
     ----------
@@ -145,6 +147,7 @@ class Pacer:
         rate: float | None = None,
         first: float = 0.0,
         lead: float = 0.0,
+        at: int | None = None,
         *,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
@@ -153,7 +156,7 @@ class Pacer:
         self._clock, self._sleep = clock, sleep
         self._begin = clock() + lead
         self._sent = 0
-        self.origin = now() + round((lead - first) * 1e6)
+        self.origin = (now() + round(lead * 1e6) if at is None else at) - round(first * 1e6)
         self.late = 0.0
 
     def utime(self, video_time: float) -> int:
@@ -212,6 +215,8 @@ class Setup:
         Video time of `start`, seconds.
     jpeg : int or None
         Quality of compressed frames.
+    begin_at : int or None
+        Capture time of the first frame of a file, microseconds since the Unix epoch; None: when it is sent.
     person : int or None
         Of several people, the number of the one in `start`, whose tracker has to answer; None: people are not
         distinguished, and any tracker may confirm camera and empty scene.
@@ -224,6 +229,7 @@ class Setup:
     start: Start | None = None
     start_time: float = 0.0
     jpeg: int | None = None
+    begin_at: int | None = None
     person: int | None = None
 
 
@@ -277,17 +283,23 @@ class Publisher:
 
         With `patience` > 0 START is repeated, each time for a later stream, until a tracker confirms it.  For
         a file, START names a capture time; for a live camera, it refers to the next frame.
+
+        Raises
+        ------
+        UserError
+            If no tracker confirms START, or the time at which to begin has passed.
         """
         self._announced = source.first
         if self._setup.start is None or patience <= 0 or isinstance(self._out, LogWriter):
-            pacer = Pacer(rate, source.first)
+            pacer = Pacer(rate, source.first, self._lead(0.0), self._setup.begin_at)
             self.announce(pacer.utime(source.first))
             if self._setup.start is not None:
                 self._send_start(0 if source.live else pacer.utime(self._setup.start_time))
             return pacer
         deadline = time.monotonic() + patience
         while time.monotonic() < deadline:
-            pacer = Pacer(rate, source.first, 0.0 if source.live else _LEAD)
+            lead = self._lead(0.0 if source.live else _LEAD)
+            pacer = Pacer(rate, source.first, lead, self._setup.begin_at)
             asked = self._send_start(0 if source.live else pacer.utime(self._setup.start_time))
             if self._listen(0.8 * _LEAD, partial(_confirms, asked)):
                 return pacer
@@ -295,6 +307,16 @@ class Publisher:
         if self._setup.person is None and self._other:
             remedy = f"one of several people answers on {self._other}: give --person"
         raise UserError(f"no tracker confirmed START within {patience:g} s; {remedy}")
+
+    def _lead(self, usual: float) -> float:
+        """Seconds until the first frame is due; UserError if that has passed.  A log may be of any time."""
+        at = self._setup.begin_at
+        if at is None or isinstance(self._out, LogWriter):
+            return usual
+        lead = (at - now()) / 1e6
+        if lead < 0:
+            raise UserError(f"--begin-at: passed {-lead:.3g} s ago; give a later time, as seconds since 1970")
+        return lead
 
     def send(
         self,
