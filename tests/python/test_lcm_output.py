@@ -122,6 +122,17 @@ def test_a_log_that_may_not_grow_is_noticed(tmp_path):
     one_line(done, 1, "cannot be written: File too large")
 
 
+def test_a_log_of_which_nothing_could_be_written_is_removed(tmp_path):
+    """Also one that replaced another, which is lost as soon as it is opened."""
+
+    def none():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+
+    done = run(log(tmp_path), f"file://{tmp_path}/out.log?mode=w", preexec_fn=none)
+    one_line(done, 1, "cannot be written: File too large")
+    assert [path.name for path in tmp_path.iterdir()] == ["in.log"]
+
+
 def test_a_log_in_no_folder_is_refused_with_the_reason(tmp_path):
     done = run(log(tmp_path), f"file://{tmp_path}/no/x.log?mode=w")
     one_line(done, 1, "no/x.log", "cannot be written: No such file or directory")

@@ -216,6 +216,8 @@ bool sink_open(sink *s, const char *url, message *why)
     if (!lock(s, path, why))
         return false;
     s->log = lcm_eventlog_create(path, mode);
+    if (mode[0] == 'w')
+        snprintf(s->path, sizeof s->path, "%s", path);
     if (s->log)
         return true;
     message_set(why, "%.160s: this log cannot be written: %s", path, strerror(errno));
@@ -269,6 +271,14 @@ static bool flush(FILE *f)
     return fflush(f) == 0 && (fsync(fileno(f)) == 0 || errno == EINVAL || errno == EROFS);
 }
 
+/* Remove a new log for which there was no space at all. */
+static void remove_empty(const sink *s)
+{
+    struct stat is;
+    if (s->failed && s->path[0] && fstat(s->lock, &is) == 0 && S_ISREG(is.st_mode) && is.st_size == 0)
+        unlink(s->path);
+}
+
 bool sink_close(sink *s, message *why)
 {
     if (s->lcm)
@@ -280,8 +290,10 @@ bool sink_close(sink *s, message *why)
                                 s->log ? "the log cannot be written:" : "messages were lost:", s->fault.text);
     if (s->log)
         lcm_eventlog_destroy(s->log);
-    if (s->log && s->lock >= 0)
+    if (s->log && s->lock >= 0) {
+        remove_empty(s);
         close(s->lock);
+    }
     *s = (sink){0};
     return ok;
 }

@@ -32,12 +32,13 @@ bool link_is_log(const char *url);
 char link_log(const char *url, char path[LINK_PATH]);
 
 /* ---- output to LCM, or to a log with checked writes (LCM's own log provider does not report failures). */
-typedef struct sink {    /* all zero: no output */
-    lcm_t *lcm;          /* or NULL */
-    lcm_eventlog_t *log; /* or NULL */
-    int lock;            /* with a log: descriptor that locks it, or -1 */
-    int64_t failed;      /* messages that did not go out */
-    message fault;       /* of the first of them */
+typedef struct sink {     /* all zero: no output */
+    lcm_t *lcm;           /* or NULL */
+    lcm_eventlog_t *log;  /* or NULL */
+    int lock;             /* with a log: descriptor that locks it, or -1 */
+    char path[LINK_PATH]; /* of a new log */
+    int64_t failed;       /* messages that did not go out */
+    message fault;        /* of the first of them */
 } sink;
 
 /* Open `url`; a log has ?mode=w (new) or a (append), and no other writer. */

@@ -392,7 +392,9 @@ static bool resume(const char *path, service *s, const file_bytes *file, message
         if (r.person)
             snprintf(who, sizeof who, "person %d", (int)r.person);
         if (resume_person(s, &r, state, why))
-            log_line("--snapshot %.160s: following %s of frame %" PRId64, path, who, r.frame);
+            log_line("--snapshot %.120s: following %s of frame %" PRId64
+                     ", captured %.1f s ago, if the next frame is at most %g s later",
+                     path, who, r.frame, 1e-6 * (double)(clock_wall() - r.utime), s->shared->max_gap);
         else
             log_line("--snapshot %.120s: %s is not used: %.90s", path, who, why->text);
     }

@@ -12,9 +12,9 @@ rates that receivers derive from them are not those of the machine.
 the empty scene and START.  Without it the stream begins at once.  With trackers of several people, --person N
 sends START to that of person N.
 
---url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd replays without loss, and ?mode=a
-appends to one.  A log is replayed in the order of its messages, so a film of a second camera cannot come after
-that of the first: send both at once, with --begin-at, and record them with lcm-logger.
+--url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd replays without loss; with ?mode=a
+it is appended to.  A log is replayed in the order of its messages, so a second camera's film cannot come
+after that of the first: send both at once, with --begin-at, and record them with lcm-logger.
 
 If a stream (RTSP, HTTP) breaks, the command reconnects within seconds; frames are stamped as they arrive.
 
