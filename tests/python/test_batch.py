@@ -38,7 +38,7 @@ if words[0] == "track":
         time.sleep(0.01)
     out = Path(words[words.index("-o") + 1])
     one = {"frames": 3, "init": 1, "tracking": 2, "digest": "x", "verdict": "Tracked <3>", "warning": "alone",
-           "notes": ["broken"], "offsets_s": [0.1234, -2]}
+           "notes": ["not used: init.json"], "offsets_s": [0.1234, -2]}
     print("start found\\nwarning: camera.json: does not fit\\nwarning: broken", file=sys.stderr)
     people = "12" if "--people" in words else ""
     for path in [out.with_name(f"track-{k}.csv") for k in people] or [out]:
@@ -145,7 +145,7 @@ def test_verdict_warnings_offsets_and_shares_are_shown(place):
     """Warnings of the track and of its report, each once; other lines on stderr are no warnings."""
     for _ in range(2):
         rows = runner(place).run(clips_of(place, PROJECT), 1, lambda _: None)
-        assert rows[0]["warnings"] == "alone | broken | camera.json: does not fit | short"
+        assert rows[0]["warnings"] == "alone | camera.json: does not fit | broken | short"
         assert (rows[0]["verdict"], rows[0]["offsets_s"]) == ("Tracked <3>", "0.123 -2.000")
     write_summary(place / "out", rows)
     with open(place / "out/summary.csv", newline="") as file:

@@ -121,6 +121,17 @@ def test_start_and_stop_choose_the_rows(scene, capsys):
     assert capsys.readouterr().err == ""
 
 
+def test_a_film_that_breaks_off_is_a_warning(scene, capsys, monkeypatch):
+    class Cut(Video):
+        def __init__(self, path):
+            super().__init__(path)
+            self.broken = f"{path}: breaks off"
+
+    monkeypatch.setattr("gait.track.scene.Video", Cut)
+    assert track(scene, "--stop", 3) == 0
+    assert capsys.readouterr().err.startswith(f"warning: {scene / 'walk.mp4'}: breaks off\n")
+
+
 def test_automatic_start_reports_what_it_found(scene, capsys):
     assert track(scene, "--init", "auto", "--height", 1.75) == 0
     out, err = capsys.readouterr()

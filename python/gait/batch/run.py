@@ -106,7 +106,7 @@ class Runner:
         row, errors = _begun(clip) | ({} if person is None else {"person": int(person)}), []
         row |= _figures("lift" if clip.lifted else "track", found)
         warnings = [found["warning"]] if found.get("warning") else []
-        warnings += [*found.get("notes", ()), *found["warnings"]]
+        warnings += found["warnings"]
         for target, command in clip.further(folder, person).items():
             try:
                 made = self._command(command)

@@ -164,6 +164,7 @@ class Scene:
             If a file cannot be read or does not fit the others.
         """
         video = Video(options.video)
+        warning(video.broken or "", options.quiet or not video.broken)
         frames = video.span(options.start or 0, options.stop)
         camera, poses = _cameras(options, video, frames)
         name = options.model or ("paper" if options.mode == Mode.PAPER else "walk")
