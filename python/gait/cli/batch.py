@@ -24,8 +24,8 @@ make: track or lift; overlay and report of a track; trc c3d bvh mot parquet rrd 
 Every clip has its own folder in DIR and its own processes: one that is damaged or crashes becomes a failed
 row of the summary, and the others continue.  Run the same command again to resume: it skips clips that are
 done with the same settings, files (also those that options name) and version, and retries failed ones.
-DIR/summary.csv (and .parquet, with PyArrow) has one row per clip and person, DIR/index.html links to all
-files.  The exit code is 1 if a clip failed.
+DIR/summary.csv (and .parquet, with PyArrow) has one row per clip and person, with verdict and warnings;
+DIR/index.html shows them and links to all files.  The exit code is 1 if a clip failed.
 """
 
 from __future__ import annotations
