@@ -157,8 +157,8 @@ def _clip(fields: Fields, common: Clip, folder: Path, named: bool = False) -> Cl
         if name in fields:
             given[name] = _text(fields, name)
     if "keypoints" in fields:
-        several = isinstance(fields.get("keypoints", ""), list)
-        files = _words(fields, "keypoints", None) if several else (_text(fields, "keypoints"),)
+        as_list = isinstance(fields.get("keypoints", ""), list)
+        files = _words(fields, "keypoints", None) if as_list else (_text(fields, "keypoints"),)
         given["keypoints"] = tuple(str(folder / file) for file in files)
     for one, several in _FILES.items():
         if one in fields and several in fields:
