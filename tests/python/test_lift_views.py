@@ -188,8 +188,8 @@ VIEWS = ("--camera", "a.json", "--camera", "b.json")
             "it begins 100.00 s before that, which takes 2.93 s; correct --offsets",
         ),
         (
-            ("a.csv", "--camera", "a.json", "--camera", "a.json", "--offsets", "0"),
-            "a.csv: its camera is at the same place as that of a.csv; give each film and camera once",
+            ("b.csv", "--camera", "a.json", "--camera", "a.json", "--offsets", "0"),
+            "b.csv: its camera is at the same place as that of a.csv; give each film and camera once",
         ),
         (
             ("b.csv", "b_late.csv", *VIEWS, "--camera", "b.json", "--offsets", "0,0.4"),

@@ -256,6 +256,8 @@ def test_a_second_camera_shows_how_far_the_person_is(tmp_path, monkeypatch, caps
         ),
         (["--camera", "three.toml"], "--camera: 3 for 2 films"),
         (["--camera", "three.toml", "--offsets", "soon"], "'soon' is not a list of seconds"),
+        (["--camera", "three.toml", "--offsets", "1e308"], "1e308: give seconds from -86400 to 86400"),
+        (["--camera", "three.toml", "--offsets", "nan"], "nan: give seconds from -86400 to 86400"),
     ],
 )
 def test_films_cameras_and_offsets_must_match(words, message, tmp_path, monkeypatch, capsys):
@@ -279,12 +281,27 @@ def test_without_joints_the_offset_must_be_given(tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "t.csv").exists()
 
 
-def test_a_film_given_twice_is_one_line(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("command", ["track", "lift"])
+def test_one_film_has_one_camera_and_is_given_once(command, tmp_path, monkeypatch, capsys):
+    """A file of the same name in another folder is another film."""
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    cameras = ["--camera", "a.json", "--camera", "b.json"]
+    assert main([command, "a.csv", *cameras, "-o", "t.csv"]) == 2
+    assert "--camera: 2 for one film; give one, or further films" in capsys.readouterr().err
+    assert main([command, "a.csv", "sub/../a.csv", *cameras, "-o", "t.csv"]) == 2
+    assert "sub/../a.csv: is given twice; give each film once" in capsys.readouterr().err
+    assert main([command, "a.csv", "sub/a.csv", *cameras, "-o", "t.csv"]) == 1
+    assert "twice" not in capsys.readouterr().err
+
+
+def test_cameras_at_one_place_are_refused_before_long_work(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(scene.Scene, "read", None)
     simulate(replace(SCENARIO, frames=8), ".")
-    words = ["track", "video.mp4", "video.mp4", "--camera", "camera.json", "--camera", "camera.json"]
+    words = ["track", "video.mp4", "video_2.mp4", "--camera", "camera.json", "--camera", "camera.json"]
     assert main([*words, "--init", "init.json", "--detector", "none", "-o", "t.csv"]) == 1
-    assert "its camera is at the same place as that of video.mp4" in capsys.readouterr().err
+    assert "video_2.mp4: its camera is at the same place as that of video.mp4" in capsys.readouterr().err
 
 
 def test_only_the_first_film_has_to_show_the_start(tmp_path, monkeypatch, capsys):

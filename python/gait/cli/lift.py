@@ -279,9 +279,7 @@ def _take_views(args: argparse.Namespace) -> None:
     """Set `input` and `camera` to those of the first view, and `further` to those of the others."""
     inputs = args.input
     if len(inputs) == 1:
-        if args.offsets is not None:
-            raise UsageError("--offsets: is for further films")
-        args.input, args.camera, args.further = inputs[0], (args.camera or [None])[-1], []
+        args.input, args.camera, args.further = inputs[0], values.camera_of(args.camera, args.offsets), []
         return
     if len(inputs) > MAX_CAMERAS:
         raise UsageError(f"{len(inputs)} views; give at most {MAX_CAMERAS}")
@@ -290,7 +288,7 @@ def _take_views(args: argparse.Namespace) -> None:
     for option in _ONLY_ONE_VIEW:
         if getattr(args, option) not in (None, False, "off"):
             raise UsageError(f"--{option.replace('_', '-')}: is for one view; leave it out, or lift one view")
-    cameras = values.cameras_of(args.camera, args.offsets, len(inputs))
+    cameras = values.cameras_of(args.camera, args.offsets, inputs)
     args.input, args.camera = inputs[0], cameras[0]
     args.further = list(zip(inputs[1:], cameras[1:], strict=True))
 
@@ -429,9 +427,13 @@ def _filmed(
 
 
 def _clips(args: argparse.Namespace) -> list[Clip]:
-    """Collect what each view's file of another tool may lack: person, times, and the size of the picture."""
+    """Collect what each view's file of another tool may lack: person, times, and the size of the picture.
+
+    UserError if cameras of several views are at the same place.
+    """
     from gait.camera.camera import Camera
     from gait.io.detections import Clip
+    from gait.track.synchronise import require_apart
 
     size = times = None
     if args.video:
@@ -441,9 +443,11 @@ def _clips(args: argparse.Namespace) -> list[Clip]:
         size, times = film.size, film.times
     clips = []
     people, rates = (_of_views(args, option) for option in ("person", "fps"))
-    for (_, camera), person, fps in zip(_views(args), people, rates, strict=True):
-        own = Camera.read(camera).size if camera and not size else size
-        clips.append(Clip(person, fps, times, own, args.quiet))
+    cameras = [Camera.read(camera) if camera and not size else None for _, camera in _views(args)]
+    for camera, person, fps in zip(cameras, people, rates, strict=True):
+        clips.append(Clip(person, fps, times, camera.size if camera else size, args.quiet))
+    if args.further:
+        require_apart([path for path, _ in _views(args)], [camera for camera in cameras if camera])
     return clips
 
 

@@ -257,9 +257,8 @@ def _cameras(args: argparse.Namespace) -> list[str]:
     if films > MAX_CAMERAS:
         raise UsageError(f"{films} films; give at most {MAX_CAMERAS}")
     if films == 1:
-        if args.offsets is not None:
-            raise UsageError("--offsets: is for further films")
-        return (args.camera or [])[-1:]
+        camera = values.camera_of(args.camera, args.offsets)
+        return [camera] if camera else []
     alone = {
         "--people": args.people, "--keypoints": args.keypoints, "--camera-path": args.camera_path,
         "--stabilize": args.stabilize == "auto", "--cameras-out": args.cameras_out,
@@ -269,7 +268,7 @@ def _cameras(args: argparse.Namespace) -> list[str]:
     for option, given in alone.items():
         if given:
             raise UsageError(f"{option}: is for one film; leave it out, or track one film")
-    return values.cameras_of(args.camera, args.offsets, films)
+    return values.cameras_of(args.camera, args.offsets, args.video)
 
 
 def _people(text: str) -> int:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from argparse import ArgumentParser, ArgumentTypeError, _ActionsContainer
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from gait.bindings.abi import Mode
 from gait.bindings.config import TrackerConfig
@@ -14,6 +14,7 @@ PARTICLES_RANGE = (16, 1 << 20)  # as in gait.h and gait-trackd, like the ranges
 THREADS = (1, 256)  # GAIT_POOL_MAX
 SEED_RANGE = (0, (1 << 64) - 1)
 STREAM = (0, 30)
+LONGEST_OFFSET_S = 86400.0  # a day
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
 PAGES = (".html", ".htm")
 FILMS = (".mp4", ".mkv", ".mov")  # suffixes of films that can be written
@@ -129,20 +130,43 @@ def offsets(text: str) -> tuple[float, ...]:
         seconds = tuple(float(part) for part in text.split(","))
     except ValueError:
         raise ArgumentTypeError(f"{text!r} is not a list of seconds, such as 0.5,-1.2") from None
-    if not all(math.isfinite(one) for one in seconds):
-        raise ArgumentTypeError(f"{text!r} contains a number that is not finite")
+    if not all(abs(one) <= LONGEST_OFFSET_S for one in seconds):
+        raise ArgumentTypeError(f"{text}: give seconds from -{LONGEST_OFFSET_S:g} to {LONGEST_OFFSET_S:g}")
     return seconds
 
 
-def cameras_of(given: Sequence[str] | None, offsets: Sequence[float] | None, films: int) -> list[str]:
-    """Return the camera file of each film, from those `given`; UsageError if counts, or `offsets`, differ."""
+def camera_of(given: Sequence[str] | None, offsets: Sequence[float] | None) -> str | None:
+    """Return the camera file of a single film or view, from those `given`; UsageError if there are more."""
+    if offsets is not None:
+        raise UsageError("--offsets: is for further films")
+    if given and len(given) > 1:
+        raise UsageError(f"--camera: {len(given)} for one film; give one, or further films")
+    return given[0] if given else None
+
+
+def cameras_of(
+    given: Sequence[str] | None, offsets: Sequence[float] | None, films: Sequence[str]
+) -> list[str]:
+    """Return the camera file of each of several films or views, from those `given`.
+
+    Raises
+    ------
+    UsageError
+        If their number, or that of `offsets`, is wrong, or a film is given twice.
+    """
     from gait.camera.camera import camera_names  # here, so that --help answers at once
 
     cameras = [name for file in given or () for name in camera_names(file)]
-    if len(cameras) != films:
-        raise UsageError(f"--camera: {len(cameras)} for {films} films; give one for each, all in one world")
-    if offsets is not None and len(offsets) != films - 1:
-        raise UsageError(f"--offsets: {len(offsets)} for {films - 1} further films; give one for each")
+    if len(cameras) != len(films):
+        raise UsageError(
+            f"--camera: {len(cameras)} for {len(films)} films; give one for each, all in one world"
+        )
+    if offsets is not None and len(offsets) != len(films) - 1:
+        raise UsageError(f"--offsets: {len(offsets)} for {len(films) - 1} further films; give one for each")
+    files = [Path(film).resolve() for film in films]
+    for k, film in enumerate(films):
+        if files[k] in files[:k]:
+            raise UsageError(f"{film}: is given twice; give each film once")
     return cameras
 
 

@@ -20,7 +20,7 @@ from gait.progress import note, progress, warning
 from gait.track.box_start import BoxStart
 from gait.track.clip_output import write
 from gait.track.follow import Follower
-from gait.track.further_cameras import with_further_cameras
+from gait.track.further_cameras import require_cameras, with_further_cameras
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import KEYPOINTS_SD, ClipOptions
 from gait.track.own_body import FirstPass, own_model
@@ -51,6 +51,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     UserError
         If a file cannot be read, no person can be found to start with, or no frame can be tracked.
     """
+    require_cameras(options)
     scene = with_further_cameras(options, Scene.read(options))
     if options.own_body:
         scene = _with_own_body(options, scene)

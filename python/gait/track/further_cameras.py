@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.video import Frame, Video
 from gait.progress import note
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene, require_scene, stays
-from gait.track.synchronise import Film, no_shared_frame, synchronise
+from gait.track.synchronise import Film, no_shared_frame, require_apart, synchronise
 
 Array = NDArray[np.float64]
 
@@ -82,6 +83,15 @@ def _nearest(times: Array, others: Array) -> NDArray[np.int64]:
     frame = max(float(np.median(np.diff(times))), float(np.median(np.diff(others))))
     known &= np.abs(others[partner] - times) <= frame / 2
     return np.where(known, partner, -1)
+
+
+def require_cameras(options: ClipOptions) -> None:
+    """Raise UserError if a camera file of several films cannot be used, before long work."""
+    if options.further:
+        assert options.camera is not None
+        films = ((options.video, options.camera), *options.further)
+        cameras = [Camera.read(file, Video(film).size, options.scale_camera) for film, file in films]
+        require_apart([film for film, _ in films], cameras)
 
 
 def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:

@@ -88,6 +88,17 @@ class Offset:
     source: str = "motion"
 
 
+def require_apart(paths: Sequence[str], cameras: Sequence[Camera]) -> None:
+    """Raise UserError, naming the films `paths`, if two of their cameras are at the same place."""
+    for k, (path, camera) in enumerate(zip(paths, cameras, strict=True)):
+        for before, other in zip(paths, cameras[:k], strict=False):
+            if np.linalg.norm(camera.centre - other.centre) < _SAME_PLACE_M:
+                raise UserError(
+                    f"{path}: its camera is at the same place as that of {before}; give each film and camera "
+                    "once"
+                )
+
+
 def synchronise(films: Sequence[Film[Id]], other: Film[Id], given: float | None) -> tuple[Id, Offset, str]:
     """Find the person of the first film in another film, and the film's offset, with words that describe it.
 
@@ -101,14 +112,8 @@ def synchronise(films: Sequence[Film[Id]], other: Film[Id], given: float | None)
     Raises
     ------
     UserError
-        If two cameras are at the same place, or the motion does not show an offset that is not given.
+        If the motion does not show an offset that is not given.
     """
-    for film in films:
-        if np.linalg.norm(other.camera.centre - film.camera.centre) < _SAME_PLACE_M:
-            raise UserError(
-                f"{other.path}: its camera is at the same place as that of {film.path}; give each film and "
-                "camera once"
-            )
     first = films[0]
     person, offset = same_person(first, other, given)
     if given is None and not offset.certain:
