@@ -90,6 +90,18 @@ def test_limbs_that_a_view_swaps_in_half_of_the_frames_are_put_back(place, capsy
     assert swapped < 1.1 * right and kept > 1.5 * right
 
 
+def test_outliers_are_named_with_their_view(place, monkeypatch, capsys):
+    monkeypatch.chdir(place)
+    found = read("b.csv", walking.NAMES)[0]
+    uv = found.uv.copy()
+    uv[5:12, found.names.index("l_ankle")] += 60
+    write("b_wrong.csv", replace(found, uv=uv))
+    words = ["lift", "a.csv", "b_wrong.csv", *VIEWS, "--offsets", "0", "--keep-sides", "--keep-spikes"]
+    assert main([*words, "-o", "out.csv"]) == 0
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("outliers")]
+    assert "l_ankle in 7 frames of b_wrong.csv" in line and "of a.csv" not in line
+
+
 def test_enlarged_errors_do_not_hide_a_motion_unlike_the_priors():
     """Chi2 is compared with that of a motion that fits, which is smaller the more the errors are enlarged."""
     prior, observed = SegmentPrior.load(), walking.keypoints(SIDE)

@@ -152,6 +152,8 @@ class Lifted:
         Repairs of the keypoints, as in the ``--json`` summary.
     edits : Edits
         Corrections by hand.
+    films : tuple of str
+        Files of several views.
     """
 
     keypoints: Keypoints
@@ -160,6 +162,7 @@ class Lifted:
     motion: Motion
     repairs: dict[str, Any] = field(default_factory=dict)
     edits: Edits = Edits()
+    films: tuple[str, ...] = ()
 
 
 def load_prior(model: str | None, warn: Warn) -> SegmentPrior:
@@ -297,7 +300,8 @@ def lift_views(
             repairs["swaps"] += [{"film": path, **span} for span in _spans(swapped)]
             repairs["swapped"] += int((after.visible & (after.uv != before.uv).any(axis=2)).sum())
     usual = replace(options, pixel_sd=float(np.median(np.array(noise)[camera_of])))
-    return replace(lifted, options=usual, repairs=repairs)
+    paths = tuple(view.path for view in views)
+    return replace(lifted, options=usual, repairs=repairs, films=paths)
 
 
 def _person(
@@ -533,7 +537,7 @@ def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
     found, keypoints, options = lifted.motion, lifted.keypoints, lifted.options
     camera = not isinstance(lifted.view, Parallel)
     far = float(np.nanmedian(found.error)) / options.pixel_sd
-    outliers, shake = _named_outliers(found, keypoints.names), noise.shake(keypoints)
+    outliers, shake = _named_outliers(lifted), noise.shake(keypoints)
     lost = _share_lost(found, keypoints, int(lifted.repairs["spikes"]))
     believed, sd = motion.believed_stature(options, prior_stature)
     off = abs(found.stature - believed) / sd if found.steps else 0.0  # single segments do not
@@ -572,9 +576,15 @@ def _share_lost(found: Motion, keypoints: Keypoints, spikes: int) -> float:
     return (spikes + outliers) / max(int(keypoints.visible.sum()) + spikes, 1)
 
 
-def _named_outliers(found: Motion, names: tuple[str, ...]) -> str:
-    """List points that were often outliers, and in how many frames."""
-    if found.outliers is None:
+def _named_outliers(lifted: Lifted) -> str:
+    """List points that were often outliers, in how many frames and, of several views, in which of them."""
+    if lifted.motion.outliers is None:
         return ""
-    counts = zip(names, found.outliers.sum(axis=0).tolist(), strict=True)
-    return ", ".join(f"{name} in {count} frames" for name, count in counts if count >= OUTLIER_FRAMES)
+    names, view = lifted.keypoints.names, lifted.view
+    of = [""] * len(names)
+    if isinstance(view, Several):
+        of = [f" of {lifted.films[number]}" for number in view.of_point.tolist()]
+    counts = zip(names, lifted.motion.outliers.sum(axis=0).tolist(), of, strict=True)
+    return ", ".join(
+        f"{name} in {count} frames{film}" for name, count, film in counts if count >= OUTLIER_FRAMES
+    )
