@@ -140,7 +140,9 @@ def run(
     }[arm.removesuffix(_end(arm))]
     options += {WITHOUT: ["--detector", "none"], CLASSES: ["--model", "classes"]}.get(_end(arm), [])
     command = [sys.executable, *program, "track", clip.video, "-o", out]
-    command += ["--cameras-out", turned, "--quiet", *options, *extra]
+    command += ["--quiet", *options, *extra]
+    if "off" not in extra:  # of --stabilize: then there is one camera
+        command += ["--cameras-out", turned]
     for path in (out, found, turned):
         path.unlink(missing_ok=True)
     before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
@@ -153,7 +155,8 @@ def run(
         why = why.replace(f"{clip.folder}/", "")  # the page shows no paths of this machine
         return Result(name, arm, Score({kind: float(kind == "none") for kind in KINDS}), cpu, np.nan, why)
     camera, track = Camera.read(str(found if arm == "nocam" else given), video.size), read_estimates(out)
-    cameras = read_cameras(turned, camera)
+    still = dict.fromkeys(range(video.count), camera)
+    cameras = read_cameras(turned, camera) if turned.exists() else still
     contact_sheet(clip, track, cameras, OUT / f"{name}_{arm}.png")
     return Result(name, arm, score(clip, track, cameras), cpu, video.count / wall)
 

@@ -173,6 +173,22 @@ def test_the_stride_in_which_the_person_stops_does_not_count():
     assert verdict_of(slow).speed == found.speed  # one speed on the page
 
 
+def test_a_person_followed_by_a_camera_of_unknown_motion_does_not_walk_in_place():
+    track = walking_track()
+    places = {name: place - track.places["pelvis"] * (1, 1, 0) for name, place in track.places.items()}
+    speed = np.full(len(track.time), 1.2)
+    still = replace(track, places=places, numbers=track.numbers | {"speed_m_s": speed})
+    assert ", 1.20 m/s in place" in verdict_of(still).sentence()
+    followed = verdict_of(still, camera_moves=True).sentence()
+    assert "in place" not in followed and ", 1.20 m/s by the strides, as the camera moves" in followed
+
+
+def test_one_frame_is_singular():
+    found = verdict_of(walking_track())
+    one = replace(found, total=1, counts=found.counts | {"tracking": 1})
+    assert one.statuses().startswith("1 frame: 0 init, 1 tracking")
+
+
 def test_a_missed_event_leaves_double_support_empty():
     track = walking_track()
     start = find_events(track).strike["right"][1]

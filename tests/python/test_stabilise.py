@@ -11,17 +11,18 @@ from walking_keypoints import MODEL, walk_at
 
 from gait import Camera, Video
 from gait.camera.camera import write_camera
+from gait.camera.path import CameraPose, write_path
 from gait.cli import main
 from gait.errors import UserError
-from gait.io.keypoints_file import Keypoints
+from gait.io.keypoints_file import Keypoints, write
 from gait.io.video import VideoWriter, sample_frames
 from gait.lift import detected
 from gait.studio.source import require_still
 from gait.track.camera_motion import View
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
-from gait.track.scene import Scene
-from gait.track.stabilise import find_motion, find_travel, moves
+from gait.track.scene import Scene, motion_remedy, stays
+from gait.track.stabilise import expected_lens, find_motion, find_travel, moves, turn_in_samples
 
 CAMERA = Camera.looking((0.0, -6.0, 1.5), (0.0, 0.0, 1.0), (320, 240), 270.0)
 PANORAMA = replace(CAMERA, width=800, height=600, cx=400.0, cy=300.0)
@@ -45,12 +46,16 @@ def views(pan: float, shake: float, count: int = FRAMES) -> list[View]:
     return [View(cv2.Rodrigues(np.array(turn))[0], zoom) for turn, zoom in zip(turns, zooms, strict=True)]
 
 
-def film(path, turned: list[View], texture: float = 25.0) -> Video:
-    """Write what a camera sees: the scene, and a box that walks through it."""
+def film(path, turned: list[View], texture: float = 25.0, cameras=(CAMERA, PANORAMA)) -> Video:
+    """Write what a camera sees: the scene, and a box that walks through it.
+
+    `cameras`: the one that films, and that of the picture of the whole scene.
+    """
+    lens, whole = cameras
     still, grid = scene(texture), np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1)
     with VideoWriter(path, 30, crf=6) as out:
         for k, view in enumerate(turned):
-            places = map_pixels(grid, view.camera(CAMERA), PANORAMA).astype(np.float32)
+            places = map_pixels(grid, view.camera(lens), whole).astype(np.float32)
             picture = cv2.remap(still, *cv2.split(places), cv2.INTER_LINEAR)
             picture[80:200, 20 * (k % FRAMES) :][:, :PERSON] = 30 + 10 * (k % FRAMES)
             out.write(picture)
@@ -131,7 +136,7 @@ def travelling(
 def test_the_poses_of_a_camera_that_travels_over_a_floor_are_found(tmp_path, capsys, floor):
     """Although a box moves with the camera and is not known to be a person, or only a lane has texture."""
     video, cameras = travelling(tmp_path / "v.mp4", 0.8, 0.2, floor)
-    poses = find_travel(video, cameras[0], sample_frames(video), {}, quiet=False)
+    poses = find_travel(video, cameras[0], sample_frames(video), {}, range(12), quiet=False)
     assert len(poses) == len(cameras) and "the camera travelled up to 0.8 m" in capsys.readouterr().err
     for number, camera in enumerate(cameras):
         assert np.linalg.norm(poses[number].centre - camera.centre) < 0.02
@@ -141,7 +146,17 @@ def test_the_poses_of_a_camera_that_travels_over_a_floor_are_found(tmp_path, cap
 @pytest.mark.parametrize(("away", "floor", "wall"), [(0.0, 99.0, 0.0), (0.8, 0.0, 0.0), (0.8, 99.0, 2.0)])
 def test_a_camera_that_only_turns_or_sees_no_floor_has_no_path(tmp_path, away, floor, wall):
     video, cameras = travelling(tmp_path / "v.mp4", away, 0.0 if wall else 0.2, floor, wall)
-    assert find_travel(video, cameras[0], sample_frames(video), {}, quiet=True) == {}
+    assert find_travel(video, cameras[0], sample_frames(video), {}, range(12), quiet=True) == {}
+
+
+def test_the_reported_motion_is_that_in_the_frames_to_track(tmp_path, capsys):
+    half = range(FRAMES // 2)
+    video, cameras = travelling(tmp_path / "v.mp4", 0.8, 0.2)
+    find_travel(video, cameras[0], sample_frames(video), {}, half, quiet=False)
+    assert "the camera travelled up to 0.3 m" in capsys.readouterr().err
+    video = film(tmp_path / "w.mp4", views(0.3, 0.0))
+    motion, _ = find_motion(video, CAMERA, sample_frames(video), people(), first=True)
+    assert motion.furthest(half) < 0.5 * motion.furthest()
 
 
 def test_a_path_that_was_to_be_estimated_and_was_not_is_not_written(tmp_path, monkeypatch):
@@ -155,6 +170,69 @@ def test_a_path_that_was_to_be_estimated_and_was_not_is_not_written(tmp_path, mo
     with pytest.raises(UserError, match="p.csv: not written, as the camera .* is not estimated"):
         Scene.read(options)
     assert Scene.read(replace(options, stabilize="pans")).moved
+
+
+def test_cameras_of_a_pan_that_is_not_estimated_are_not_written(tmp_path):
+    film(tmp_path / "v.mp4", views(0.3, 0.0))
+    write_camera(tmp_path / "camera.json", CAMERA)
+    names = (str(tmp_path / name) for name in ("v.mp4", "camera.json", "t.csv"))
+    options = ClipOptions(*names, detector="none", stabilize="off", background="none")
+    with pytest.raises(UserError, match="p.csv: not written, .* --stabilize auto estimates its motion"):
+        Scene.read(replace(options, cameras_out=str(tmp_path / "p.csv")))
+
+
+def test_a_person_followed_by_a_camera_with_given_poses_does_not_stay(tmp_path):
+    """Where they are in the picture of a camera that stands still."""
+    count = 30
+    turned = views(0.3, 0.0, count)
+    video = film(tmp_path / "v.mp4", turned)
+    write_camera(tmp_path / "camera.json", CAMERA)
+    write_path(
+        tmp_path / "poses.csv",
+        range(count),
+        [CameraPose.of(view.camera(CAMERA)) for view in turned],
+        by_frame=True,
+    )
+    places = [walk_at(k / 30, (0.0, (-0.6, 0.0))) for k in range(count)]
+    found = {True: [view.camera(CAMERA).project(now) for view, now in zip(turned, places, strict=True)]}
+    found[False] = [view.camera(CAMERA).project(places[0]) for view in turned]
+    for walks, uv in found.items():
+        known = np.ones((count, len(MODEL.joint_names)))
+        write(
+            tmp_path / "k.csv",
+            Keypoints(np.arange(count), video.times, MODEL.joint_names, np.array(uv), known),
+        )
+        read = Scene.read(
+            ClipOptions(
+                *(str(tmp_path / name) for name in ("v.mp4", "camera.json", "t.csv")),
+                camera_path=str(tmp_path / "poses.csv"),
+                keypoints=str(tmp_path / "k.csv"),
+            )
+        )
+        assert read.empty is not None and stays(read) is not walks
+
+
+def test_a_pan_of_a_lens_of_unknown_length_is_found(tmp_path, capsys):
+    """Also if its picture is two to three times as narrow as usual; a given field of view is believed."""
+    lens = replace(CAMERA, fx=680.0, fy=680.0)
+    turned = [View(cv2.Rodrigues(np.array((0.0, 0.35 * k / (FRAMES - 1), 0.0)))[0]) for k in range(FRAMES)]
+    whole = replace(lens, width=800, height=600, cx=400.0, cy=300.0)
+    video = film(tmp_path / "v.mp4", turned, cameras=(lens, whole))
+    samples = sample_frames(video)
+    assert turn_in_samples(expected_lens(video, 65.0, samples, people()), samples, people()) is None
+    found = expected_lens(video, None, samples, people())
+    assert 0.7 < found.fx / lens.fx < 1.4
+    turn = turn_in_samples(found, samples, people())
+    assert turn == pytest.approx(np.tan(0.35) * lens.fx, rel=0.05)
+
+
+def test_no_motion_is_promised_for_a_camera_that_travels_without_a_file():
+    for stabilize in ("pans", "auto"):
+        options = ClipOptions("v.mp4", None, "t.csv", height=1.75, stabilize=stabilize)
+        assert "--stabilize" not in motion_remedy(options, None)
+        assert "--camera and --camera-path" in motion_remedy(options, None)
+    options = ClipOptions("v.mp4", None, "t.csv", height=1.75)
+    assert "--stabilize auto" in motion_remedy(options, 20.0)
 
 
 def test_a_camera_that_stands_still_is_left_alone(tmp_path):

@@ -13,8 +13,8 @@ from gait.io.video import Video, sample_frames
 from gait.lift.keypoints.corrections import read_corrections, read_edits
 from gait.progress import warning
 from gait.track.from_walk import Calibration
-from gait.track.stabilise import CameraTurns, find_turns, in_words, turn_in_samples
-from gait.track.walk_camera import calibrate_film, expected_camera, find_people, note_camera
+from gait.track.stabilise import CameraTurns, expected_lens, find_turns, in_words, turn_in_samples
+from gait.track.walk_camera import calibrate_film, find_people, note_camera
 
 
 @dataclass(frozen=True)
@@ -91,18 +91,18 @@ def find_keypoints(request: Request, prior: SegmentPrior, quiet: bool) -> Detect
         One line that names the file at fault.
     """
     video = Video(request.video)
-    given = None
+    frames, given = video.span(request.start or 0, request.stop), None
     if request.camera:
         given = Camera.read(request.camera, video.size, request.scale_camera)
         given.check_place(request.camera)
     if request.corrections:
-        read_edits(request.corrections, prior, video.span(request.start or 0, request.stop), video.size)
+        read_edits(request.corrections, prior, frames, video.size)
     people = find_people(video, quiet, request.start or 0, request.stop)
     turns, samples = None, sample_frames(video)
     turn: float | None = 0.0
-    camera = given or expected_camera(video, request.fov)
+    camera = given or expected_lens(video, request.fov, samples, people)
     if request.stabilize:
-        turns = find_turns(video, camera, samples, people, None, quiet, first=given is not None)
+        turns = find_turns(video, camera, samples, people, None, frames, quiet, first=given is not None)
     elif (turn := turn_in_samples(camera, samples, people)) != 0:
         how = in_words(turn)
         warning(f"the camera {how} and counts as still: --stabilize auto estimates its turns", quiet)

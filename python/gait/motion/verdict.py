@@ -41,6 +41,8 @@ class Verdict:
         Frames with an estimate in which the person takes no strides.
     motion_class : str
         Class of the strides that count, if others are left out because of their class.
+    camera_moves : bool
+        The camera moves but counts as still: a person who walks may seem to walk in place.
     along_path : bool
         There are whole strides, but the speed is that along the whole path, because not all are of one class.
     why : dict of str to int
@@ -56,6 +58,7 @@ class Verdict:
     why: dict[str, int]
     motion_class: str = ""
     along_path: bool = False
+    camera_moves: bool = False
 
     @property
     def tracked(self) -> int:
@@ -85,11 +88,13 @@ class Verdict:
         return "; ".join([text, *(f"{what} in {count_of(n, 'frame')}" for what, n in rest.items() if n)])
 
     def _speed_words(self) -> str:
-        return " in place" if self.in_place else " along the whole path" if self.along_path else ""
+        if self.in_place:
+            return " by the strides, as the camera moves" if self.camera_moves else " in place"
+        return " along the whole path" if self.along_path else ""
 
     def statuses(self, named: Callable[[str], str] = str) -> str:
         """Numbers of frames by status, in words; `named` returns those of a status."""
-        text = f"{sum(self.counts.values())} frames: "
+        text = f"{count_of(sum(self.counts.values()), 'frame')}: "
         text += ", ".join(f"{self.counts[status]} {named(status)}" for status in STATUSES)
         return text + (f"; {self.absent} more without an estimate" if self.absent else "")
 
@@ -107,6 +112,8 @@ def verdict_of(
     track: Track,
     total: int | None = None,
     parameters: Parameters | None = None,
+    *,
+    camera_moves: bool = False,
 ) -> Verdict:
     """Judge a track.
 
@@ -117,6 +124,8 @@ def verdict_of(
         Number of frames that were to be tracked, if the track does not state them.
     parameters : Parameters, optional
         Parameters of the track, if they have been computed.
+    camera_moves : bool
+        As in `Verdict`.
     """
     counts = {status: track.status.count(status) for status in STATUSES}
     if parameters is None:
@@ -139,6 +148,7 @@ def verdict_of(
         why=dict(reasons.most_common()),
         motion_class=parameters.motion_class if parameters is not None and others else "",
         along_path=others,
+        camera_moves=camera_moves,
     )
 
 

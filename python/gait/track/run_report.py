@@ -35,7 +35,7 @@ class RunReport:
         self._track = read_track(options.output)
         self._draws = Draws.read(options.draws, self._track) if options.draws else None
         self._parameters = measured(self._track, self._draws)
-        self._verdict = verdict_of(self._track, parameters=self._parameters)
+        self._verdict = verdict_of(self._track, parameters=self._parameters, camera_moves=scene.moves_far)
 
     def figures(self) -> dict[str, Any]:
         """Return the verdict in words, a warning or None, the inputs used, the files written, and remarks."""

@@ -16,7 +16,7 @@ from gait.bindings.model import Model
 from gait.bindings.start_fit import StartFit
 from gait.body.measured import model_of
 from gait.camera.camera import Camera, read_camera
-from gait.camera.path import CameraPath, CameraPose, stand_still
+from gait.camera.path import CameraPath, CameraPose, one_place, stand_still
 from gait.detect import weights
 from gait.detect.shapes import find_people
 from gait.errors import UserError
@@ -35,12 +35,14 @@ from gait.track.other_people import OtherPeople, Outline
 from gait.track.stabilise import (
     FURTHEST_TURN,
     CameraTurns,
+    expected_lens,
     find_travel,
     find_turns,
+    in_reference,
     in_words,
     turn_in_samples,
 )
-from gait.track.walk_camera import calibrate_film, expected_camera, note_camera
+from gait.track.walk_camera import calibrate_film, note_camera
 
 Array = NDArray[np.float64]
 
@@ -89,8 +91,8 @@ class Scene:
         Time offset of each of these films, in words.
     offsets : tuple of float
         When each of them began, seconds after the first film.
-    moved : str
-        How the camera moves although it counts as still, in words; empty if it does not.
+    turn : float or None
+        How far the camera turns although it counts as still, as for `turn_in_samples`; 0 if it does not.
     against_camera : str
         How the camera file contradicts the walk, in words; empty if it does not.
     """
@@ -110,8 +112,18 @@ class Scene:
     further: tuple[Scene, ...] = ()
     began: tuple[str, ...] = ()
     offsets: tuple[float, ...] = ()
-    moved: str = ""
+    turn: float | None = 0.0
     against_camera: str = ""
+
+    @property
+    def moved(self) -> str:
+        """How the camera moves although it counts as still, in words; empty if it does not."""
+        return in_words(self.turn) if self.turn != 0 else ""
+
+    @property
+    def moves_far(self) -> bool:
+        """Whether it does more than turn a little, so that a person who walks may seem to walk in place."""
+        return self.turn is None or self.turn > FURTHEST_TURN * self.video.width
 
     @property
     def moving(self) -> MovingVideo | None:
@@ -185,21 +197,17 @@ class Scene:
                 people, person = _detect(options, video, frames)
             if beside is not None:
                 samples, plate = beside.result()
-        motion, moved = None, ""
+        motion: CameraTurns | None = None
+        turn: float | None = 0.0
         if not options.camera_path:
-            poses, motion, moved = _camera_motion(options, video, camera, samples, people, given)
-        if moved and options.cameras_out and options.stabilize == "auto":  # by default it counts as still
-            raise UserError(
-                f"{options.cameras_out}: not written, as the camera {moved} and its motion is not estimated; "
-                "--camera-path gives its poses, or leave out --cameras-out"
-            )
+            poses, motion, turn = _camera_motion(options, video, camera, samples, people, given, frames)
         calibration = None
         if camera is None:
             person, calibration = _calibrate(options, video, model, people, motion)
             camera = calibration.camera
         if motion is not None:
             poses = motion.poses(camera)
-        plate = (None if moved else plate) if given is None else given
+        plate = (plate if turn == 0 else None) if given is None else given
         if poses:
             wanted = options.background != "none"
             panorama = panorama_of(samples, camera, poses, given) if wanted else None
@@ -210,7 +218,7 @@ class Scene:
             _require_feet(people[person], video)
         sure = {id: keypoint_noise(found) for id, found in people.items()}
         scene = Scene(
-            video, camera, model, plate, motion, frames, people, person, sure, calibration, moved=moved
+            video, camera, model, plate, motion, frames, people, person, sure, calibration, turn=turn
         )
         return replace(scene, against_camera=_against_camera(options, scene)) if starts else scene
 
@@ -242,11 +250,12 @@ def _sample(
     update: Callable[[int], None] | None = None,
 ) -> tuple[list[Frame], Image | None]:
     """Sample frames over the clip if they are needed, and compute their median if it is the background."""
-    if options.background != "auto" and (options.stabilize == "off" or options.camera_path):
+    static = options.stabilize == "off" and not options.cameras_out
+    if options.background != "auto" and (static or options.camera_path):
         return [], None
     samples = sample_frames(video, progress=update)
-    static = options.background == "auto" and not poses
-    return samples, median([frame.image for frame in samples]) if static else None
+    wanted = options.background == "auto" and not poses
+    return samples, median([frame.image for frame in samples]) if wanted else None
 
 
 def _camera_motion(
@@ -256,33 +265,49 @@ def _camera_motion(
     samples: list[Frame],
     people: dict[int, Keypoints],
     given: Image | None,
-) -> tuple[dict[int, CameraPose], CameraTurns | None, str]:
+    frames: range,
+) -> tuple[dict[int, CameraPose], CameraTurns | None, float | None]:
     """Estimate the poses or turns of a camera that is not to count as still.
 
-    Of one that counts as still although it moves, return how it does, and print a note.
+    Of one that counts as still although it moves, return how far it turns, and print a note.
+
+    Raises
+    ------
+    UserError
+        If its motion is not estimated and a file of its poses is to be written; by default, only if it turns
+        far.
     """
-    lens, first = camera or expected_camera(video, options.fov), camera is not None
+    lens, first = camera or expected_lens(video, options.fov, samples, people), camera is not None
     turn = turn_in_samples(lens, samples, people) if samples else 0.0
     far = turn is not None and turn > FURTHEST_TURN * video.width and not options.further
     estimated = options.stabilize == "auto" or (options.stabilize == "pans" and far)
     if estimated and first and given is None:
-        poses = find_travel(video, lens, samples, people, options.quiet)
+        poses = find_travel(video, lens, samples, people, frames, options.quiet)
         if poses:
-            return poses, None, ""
+            return poses, None, 0.0
     motion = None
     if estimated:
-        motion = find_turns(video, lens, samples, people, given, options.quiet, first=first)
+        motion = find_turns(video, lens, samples, people, given, frames, options.quiet, first=first)
     if motion is not None or turn == 0:
-        return {}, motion, ""
-    how = in_words(turn)
+        return {}, motion, 0.0
+    how, remedy = in_words(turn), motion_remedy(options, turn)
+    if options.cameras_out and (far or options.stabilize != "pans"):
+        raise UserError(
+            f"{options.cameras_out}: not written, as the camera {how} and its motion is not estimated; "
+            f"{remedy}, or leave out --cameras-out"
+        )
     if not estimated:
         without = ", without a background" if options.background == "auto" else ""
-        warning(
-            f"the camera {how} and counts as still{without}: --stabilize auto estimates its motion, "
-            "--camera-path gives its poses",
-            options.quiet,
-        )
-    return {}, None, how
+        warning(f"the camera {how} and counts as still{without}: {remedy}", options.quiet)
+    return {}, None, turn
+
+
+def motion_remedy(options: ClipOptions, turn: float | None) -> str:
+    """State what gives the motion of a camera that counts as still; `turn` as for `turn_in_samples`."""
+    if options.camera is None and turn is None:
+        return "turns do not explain its motion: give its poses with --camera and --camera-path"
+    estimated = "" if options.stabilize == "auto" else "--stabilize auto estimates its motion, "
+    return f"{estimated}--camera-path gives its poses"
 
 
 def _calibrate(
@@ -446,11 +471,14 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
 
 
 def _in_reference(scene: Scene) -> Keypoints | None:
-    """Convert the person's keypoints to those of a camera that stands still; None if that is impossible."""
+    """Convert the person's keypoints to those of a camera that stands still; None if the camera travels."""
     keypoints = scene.people.get(scene.person)
     if keypoints is None or not scene.poses:
         return keypoints
-    return scene.motion.in_reference(keypoints) if scene.motion is not None else None
+    if not one_place(list(scene.poses.values())):
+        return None
+    cameras = {number: pose.camera(scene.camera) for number, pose in scene.poses.items()}
+    return in_reference(keypoints, cameras, scene.camera)
 
 
 def _against_camera(options: ClipOptions, scene: Scene) -> str:

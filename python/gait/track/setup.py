@@ -10,7 +10,7 @@ from gait.camera.path import one_place
 from gait.io.video import EMPTY_SCENE_FRAMES
 from gait.report.camera_facts import camera_facts
 from gait.track.options import ClipOptions
-from gait.track.scene import Scene, detects, start_words
+from gait.track.scene import Scene, detects, motion_remedy, start_words
 from gait.track.stabilise import CameraTurns
 
 _BESIDE = {"init": "init.json", "camera": "camera.json"}
@@ -98,11 +98,10 @@ def _camera(options: ClipOptions, scene: Scene) -> str:
         return f"{options.camera}, moving as in {options.camera_path}"
     motion = ""
     if scene.moved:
-        motion = f", which {scene.moved}, counts as still (--stabilize auto estimates its motion)"
-        if options.stabilize == "auto":
-            motion = f", which {scene.moved}, but its motion was not found (--camera-path gives its poses)"
+        what = "but its motion was not found" if options.stabilize == "auto" else "counts as still"
+        motion = f", which {scene.moved}, {what} ({motion_remedy(options, scene.turn)})"
     elif scene.motion is not None:
-        turn = f"which turns by up to {scene.motion.furthest():.0f} px"
+        turn = f"which turns by up to {scene.motion.furthest(scene.frames):.0f} px"
         motion = f"{_reference(scene.motion)}, {turn} (--cameras-out writes that of each frame)"
     elif scene.poses:
         motion = ", in frame 0, which travels (--cameras-out writes that of each frame)"

@@ -20,12 +20,15 @@ from gait.progress import note, progress, warning
 from gait.track.camera_motion import Box, CameraMotion, View, fit_view
 from gait.track.camera_travel import CameraTravel
 from gait.track.moving_video import map_pixels
+from gait.track.walk_camera import expected_camera, expected_fov
 
 Array = NDArray[np.float64]
 
 _KEYPOINT_MARGIN = 0.15  # of a person's height, around the keypoints
 #: Of the picture's width; a camera that turns less may count as still.
 FURTHEST_TURN = 0.1
+#: Of the usual focal length; neighbours differ by a half, and a pan is found with one a third too short.
+_FOCAL_FACTORS = (2 / 3, 3 / 2, 9 / 4, 27 / 8)
 _MOSTLY = 0.8  # share of the frames in which the camera must be found, or be still
 _TRAVELS = 1.0  # pixels in a picture 640 wide; median residual from which the camera does not only turn
 #: Metres in a second from which it travels, if the floor is seen; more than a hand moves.
@@ -51,19 +54,17 @@ class CameraTurns:
     views: list[View]
     reference: int
 
-    def furthest(self) -> float:
-        """Return the largest shift of a frame, pixels in the middle of the picture."""
+    def furthest(self, frames: range | None = None) -> float:
+        """Return the largest shift of a frame (of all, or of some), pixels in the middle of the picture."""
         middle = np.array([[self.camera.cx, self.camera.cy]])
-        places = [map_pixels(middle, self.camera, view.camera(self.camera)) - middle for view in self.views]
+        views = self.views if frames is None else self.views[frames.start : frames.stop]
+        places = [map_pixels(middle, self.camera, view.camera(self.camera)) - middle for view in views]
         return float(np.nanmax(np.hypot(*np.concatenate(places).T)))
 
     def in_reference(self, captured: Keypoints) -> Keypoints:
         """Convert keypoints of the captured frames to the pixels of the reference's camera."""
-        uv = captured.uv.copy()
-        for row, number in enumerate(captured.frame.tolist()):
-            if number < len(self.views):
-                uv[row] = map_pixels(uv[row], self.views[number].camera(self.camera), self.camera)
-        return replace(captured, uv=uv)
+        cameras = {number: view.camera(self.camera) for number, view in enumerate(self.views)}
+        return in_reference(captured, cameras, self.camera)
 
     def cameras(self, camera: Camera) -> dict[int, Camera]:
         """Return the camera of each frame; `camera`: a possibly better estimate of the reference's camera."""
@@ -80,6 +81,18 @@ class CameraTurns:
             inside = np.isfinite(after).all(axis=1)
             out[number] = CameraPose.of(fit_view(camera, before[inside], after[inside])[0].camera(camera))
         return out
+
+
+def in_reference(captured: Keypoints, cameras: Mapping[int, Camera], reference: Camera) -> Keypoints:
+    """Convert keypoints of a camera that turns in place to the pixels of `reference`, in the same place.
+
+    `cameras`: that of each frame; in other frames there are then no points.
+    """
+    uv = np.full_like(captured.uv, np.nan)
+    for row, number in enumerate(captured.frame.tolist()):
+        if number in cameras:
+            uv[row] = map_pixels(captured.uv[row], cameras[number], reference)
+    return replace(captured, uv=uv)
 
 
 def find_motion(
@@ -139,13 +152,14 @@ def find_turns(
     samples: Sequence[Frame],
     people: Mapping[int, Keypoints],
     plate: Image | None,
+    frames: range,
     quiet: bool,
     *,
     first: bool,
 ) -> CameraTurns | None:
     """Measure and report how a clip's camera turns; None if it stands still or does not only turn.
 
-    Parameters are as for `find_motion`.
+    Parameters are as for `find_motion`; `frames`: those for which the turn is reported.
     """
     with progress("camera's motion", video.count, quiet) as update:
         motion, why = find_motion(video, camera, samples, people, plate, update, first=first)
@@ -155,19 +169,24 @@ def find_turns(
         return None
     place = "the background" if plate is not None else f"frame {motion.reference}"
     note(
-        f"the camera turned by up to {motion.furthest():.0f} px: frames are stabilised to {place}, to which "
-        "camera and positions refer",
+        f"the camera turned by up to {motion.furthest(frames):.0f} px: frames are stabilised to {place}, to "
+        "which camera and positions refer",
         quiet,
     )
     return motion
 
 
 def find_travel(
-    video: Video, camera: Camera, samples: Sequence[Frame], people: Mapping[int, Keypoints], quiet: bool
+    video: Video,
+    camera: Camera,
+    samples: Sequence[Frame],
+    people: Mapping[int, Keypoints],
+    frames: range,
+    quiet: bool,
 ) -> dict[int, CameraPose]:
     """Measure how the camera travels over the floor, and report it.
 
-    Parameters are as for `find_motion`; `camera` is that of the first frame, above the floor z = 0.
+    Parameters are as for `find_turns`; `camera` is that of the first frame, above the floor z = 0.
 
     Returns
     -------
@@ -197,13 +216,41 @@ def find_travel(
     away = np.linalg.norm(centres[second:] - centres[:-second], axis=1).max()
     if away < _TRAVEL_M_PER_S or np.mean(on_floor) < _MOSTLY:
         return {}
-    far = float(np.linalg.norm(centres - centres[0], axis=1).max())
+    far = float(np.linalg.norm(centres[frames.start : frames.stop] - centres[0], axis=1).max())
     note(
         f"the camera travelled up to {far:.1f} m from where it was in frame 0, to which camera and positions "
         "refer: its poses are estimated from the floor, with errors that grow with the way",
         quiet,
     )
     return poses
+
+
+def expected_lens(
+    video: Video, fov: float | None, samples: Sequence[Frame], people: Mapping[int, Keypoints]
+) -> Camera:
+    """Return the camera expected without using the walk.
+
+    If its focal length is unknown, and turns of the usual one do not explain the samples, it is that of a few
+    others whose turns explain them best.
+
+    Parameters
+    ----------
+    fov : float, optional
+        Horizontal field of view given by the user, degrees.
+    video, samples, people
+        As for `find_motion`.
+    """
+    usual = expected_camera(video, fov)
+    known = expected_fov(video, fov, quiet=True)[0] is not None
+    if known or not samples or turn_in_samples(usual, samples, people) is not None:
+        return usual
+    residuals = {}
+    for factor in _FOCAL_FACTORS:
+        lens = replace(usual, fx=factor * usual.fx, fy=factor * usual.fy)
+        motion, views = _views(lens, samples, people)
+        if _only_turns(motion, views):
+            residuals[factor] = np.nanmedian([view.residual for view in views]), lens
+    return min(residuals.values(), key=lambda found: found[0])[1] if residuals else usual
 
 
 def turn_in_samples(
@@ -219,12 +266,19 @@ def turn_in_samples(
         The largest shift of a sample, pixels in the middle of the picture; 0 if the camera stands still, None
         if it does not only turn.
     """
+    if not moves(camera, samples, people):
+        return 0.0
+    motion, views = _views(camera, samples, people)
+    return CameraTurns(camera, views, 0).furthest() if _only_turns(motion, views) else None
+
+
+def _views(
+    camera: Camera, samples: Sequence[Frame], people: Mapping[int, Keypoints]
+) -> tuple[CameraMotion, list[View]]:
+    """Find the view of each sample, relative to the first."""
     boxes = _boxes(people)
     motion = _begin(camera, samples, boxes, None)
-    if _still(motion, samples):
-        return 0.0
-    views = [motion.step(frame.image, boxes.get(frame.number, ())) for frame in samples]
-    return CameraTurns(camera, views, 0).furthest() if _only_turns(motion, views) else None
+    return motion, [motion.step(frame.image, boxes.get(frame.number, ())) for frame in samples]
 
 
 def in_words(turn: float | None) -> str:
