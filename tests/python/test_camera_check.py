@@ -209,7 +209,7 @@ def test_gait_track_reports_it(tmp_path, monkeypatch, capsys):
         assert main([*words, f"{name}.json"]) == 0
         reports.append(capsys.readouterr().err)
     assert "camera from the walk" not in reports[0]
-    assert reports[1].startswith("wrong.json: the person appears")
+    assert reports[1].startswith("warning: wrong.json: the person appears")
     focal = float(re.search(r"camera from the walk: focal length (\d+) ", reports[1])[1])
     assert abs(focal / drawn.fx - 1) < 0.15
 

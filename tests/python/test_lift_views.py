@@ -302,12 +302,13 @@ def test_the_person_of_a_further_view_is_the_one_of_the_first(crowd, joined_of, 
 
 
 def test_one_rate_is_for_the_files_that_have_no_times(crowd, joined_of, capsys):
-    write("a.csv", walking.keypoints(walking.view()))
+    for name in ("a.csv", "c.csv"):
+        write(name, walking.keypoints(walking.view()))
     (own, foreign), _ = joined_of("a.csv", "b", *VIEWS, "--fps", 30, "--offsets", "0")
     assert own.time[1] == pytest.approx(1 / 15, abs=1e-6) and foreign.time[1] == pytest.approx(1 / 15)
     for files, message in (
         (("a.csv", "b"), "--fps: 2 for 1 file of other tools; give one for each, or one for all"),
-        (("a.csv", "a.csv"), "--fps: is for files of other tools, and no view has one"),
+        (("a.csv", "c.csv"), "--fps: is for files of other tools, and no view has one"),
     ):
         assert main(["lift", *files, *VIEWS, "--fps", "30", "--fps", "15", "-o", "x.csv"]) == 2
         assert message in capsys.readouterr().err
