@@ -16,7 +16,7 @@ import pytest
 
 from gait.io.track_file import read_track
 from gait.lcm.link import LogWriter, break_of, events_of, gaitmsg, open_lcm, private_url
-from gait.lcm.record import read_run
+from gait.lcm.record import Figures, read_run
 
 COUNT = 20
 SECOND = 1_000_000  # microseconds
@@ -163,6 +163,15 @@ def test_a_tracker_that_goes_on_from_a_snapshot_is_the_same_stream(estimates, tm
     done, frames = record(tmp_path, sent)
     assert done.returncode == 0 and done.stderr.count("\n") == 1, done.stderr
     assert frames == [e.frame for e in sent]
+
+
+def test_the_rate_of_a_live_stream_is_that_of_arrival(estimates):
+    """Films may be sent slower than recorded; a log is read as fast as possible."""
+    figures = Figures()
+    for k, estimate in enumerate(estimates):
+        figures.add(estimate, estimates[0].utime + 200_000 * k)
+    assert figures.summary(live=True)["fps"] == pytest.approx(5)
+    assert figures.summary(live=False)["fps"] == pytest.approx(rig.FPS, rel=1e-3)
 
 
 def test_another_stream_that_begins_is_reported(estimates, tmp_path):

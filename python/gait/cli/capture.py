@@ -5,16 +5,16 @@ need the same --begin-at, a few seconds from now, as each would start at its own
 number, so that receivers can count missed frames.  Calibration and empty scene are announced at the start
 and every two seconds.  With --init the tracker gets a START for the right frame.
 
-Time stamps advance as in the file, whatever the --rate: at another rate than the true one, latencies and
-rates that receivers derive from them are not those of the machine.
+Time stamps advance as in the file, whatever the --rate: at another rate than the true one, gait-trackd and
+gait record report latencies that are not those of the machine.
 
 --wait makes sure that a tracker is listening: the stream begins when gait-trackd has confirmed the camera,
 the empty scene and START.  Without it the stream begins at once.  With trackers of several people, --person N
 sends START to that of person N.
 
---url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd replays without loss; with ?mode=a
-it is appended to.  A log is replayed in the order of its messages, so a second camera's film cannot come
-after that of the first: send both at once, with --begin-at, and record them with lcm-logger.
+--url file:///PATH.log?mode=w writes an LCM log instead, from which gait-trackd drops no frame; ?mode=a
+appends to one.  A log is replayed in the order of its messages, so a second camera's film cannot come after
+that of the first: send both at once, with --begin-at, and record them with lcm-logger.
 
 If a stream (RTSP, HTTP) breaks, the command reconnects within seconds; frames are stamped as they arrive.
 

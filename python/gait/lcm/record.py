@@ -35,6 +35,7 @@ class Figures:
     step: list[float] = field(default_factory=list)
     latency: list[float] = field(default_factory=list)
     utime: list[int] = field(default_factory=list)
+    arrived: list[int] = field(default_factory=list)
     last: Any = None
     lost: int = 0
     damaged: int = 0
@@ -47,10 +48,15 @@ class Figures:
         self.step.append(message.step_us / 1e3)
         self.latency.append((arrived - message.utime) / 1e3)
         self.utime.append(message.utime)
+        self.arrived.append(arrived)
 
     def summary(self, live: bool) -> dict[str, Any]:
-        """Return the figures of ``gait record --json``; latency is meaningful only for a `live` stream."""
-        span = (self.utime[-1] - self.utime[0]) / 1e6 if len(self.utime) > 1 else 0.0
+        """Return the figures of ``gait record --json``.
+
+        Latency is meaningful only for a `live` stream.  Its rate is that of arrival, otherwise of capture.
+        """
+        times = self.arrived if live else self.utime
+        span = (times[-1] - times[0]) / 1e6 if len(times) > 1 else 0.0
         last = self.last
         return {
             "frames": len(self.utime),
