@@ -16,6 +16,7 @@ from gait.io import blob
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_track
 from gait.io.video import Frame
+from gait.report.colours import OVER_PICTURES, PERSON_COLOURS
 from gait.track import scene
 from gait.track.options import ClipOptions
 from gait.track.other_people import OTHER, OtherPeople, Outline
@@ -115,3 +116,7 @@ def test_another_person_hides_and_is_not_missed(crossing):
 def test_everyone_is_found_by_the_detector_alone(more, capsys):
     assert main(["track", "v.mp4", "--camera", "c.json", "-o", "t.csv", "--people", "2", *more]) == 2
     assert "--people" in capsys.readouterr().err
+
+
+def test_the_first_people_do_not_have_the_colours_of_sides():
+    assert not set(PERSON_COLOURS[:6]) & set(OVER_PICTURES.values())

@@ -12,7 +12,7 @@ OVER_PICTURES = {"left": (235, 165, 60), "right": (50, 125, 250), "middle": (190
 """BGR; brighter, to be visible on dark clothes, and pale green for the middle."""
 
 PERSON_COLOURS = (
-    (235, 165, 60), (50, 125, 250), (110, 200, 90), (200, 110, 220),
-    (60, 210, 240), (210, 210, 110), (150, 150, 250), (190, 190, 190),
+    (110, 200, 90), (200, 110, 220), (60, 210, 240), (210, 210, 110),
+    (150, 150, 250), (190, 190, 190), (235, 165, 60), (50, 125, 250),
 )  # fmt: skip
-"""BGR colours of several people in one picture."""
+"""BGR colours of several people in one picture, last those of sides."""
