@@ -2,6 +2,8 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import walking_keypoints as walking
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.camera.camera import Camera, write_camera
+from gait.cli import lift as command
 from gait.cli import main
 from gait.errors import UserError
 from gait.io.keypoints_file import read, write
@@ -214,8 +217,8 @@ VIEWS = ("--camera", "a.json", "--camera", "b.json")
         ),
         (
             ("still.csv", *VIEWS),
-            "still.csv: its time offset from a.csv cannot be estimated from the person's motion; give "
-            "--offsets",
+            "still.csv: its time offset from a.csv cannot be estimated from the person's motion, which both "
+            "must show for over 1 s; give --offsets",
         ),
     ],
 )
@@ -225,6 +228,26 @@ def test_a_view_that_adds_nothing_is_refused(place, words, message, monkeypatch,
     write("slow.csv", walking.keypoints(SIDE).part(slice(None, None, 3)))
     assert main(["lift", "a.csv", *words, "--keep-sides", "-o", "x.csv"]) == 1
     assert message in capsys.readouterr().err and not (place / "x.csv").exists()
+
+
+def test_start_and_stop_are_of_the_first_film(tmp_path, monkeypatch, capsys):
+    asked = {}
+
+    def detect(args, prior, video, camera):
+        asked[video] = args.start, args.stop
+        if len(asked) == 2:
+            raise UserError("both seen")
+        return SimpleNamespace(people={}, still=None, calibration=None)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(command, "_detect", detect)
+    for name, camera in (("a", walking.view()), ("b", SIDE)):
+        Path(f"{name}.mp4").touch()
+        write_camera(tmp_path / f"{name}.json", camera)
+    words = ["lift", "a.mp4", "b.mp4", "--camera", "a.json", "--camera", "b.json", "-o", "out.csv"]
+    assert main([*words, "--start", "5", "--stop", "40"]) == 1
+    assert "both seen" in capsys.readouterr().err
+    assert asked == {"a.mp4": (5, 40), "b.mp4": (None, None)}
 
 
 def test_whether_an_offset_was_estimated_or_given_is_reported(place, joined_of, monkeypatch, capsys):

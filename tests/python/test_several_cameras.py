@@ -11,7 +11,7 @@ import pytest
 
 from gait import Video, VideoWriter
 from gait.body.skeleton import axis_rotation
-from gait.camera.camera import read_camera
+from gait.camera.camera import read_camera, write_camera
 from gait.cli import main
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
@@ -21,7 +21,8 @@ from gait.simulate.clip import simulate
 from gait.simulate.scenario import PRESETS
 from gait.simulate.stage import set_stage
 from gait.track import scene
-from gait.track.further_cameras import SeveralVideos
+from gait.track.clip import ClipOptions
+from gait.track.further_cameras import SeveralVideos, with_further_cameras
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.silhouette_offset import Filmed, silhouette_offset
 from gait.track.synchronise import Film, find_offset, synchronise
@@ -77,6 +78,57 @@ def test_a_person_who_stands_does_not_give_the_time(stage):
     ours, theirs = (keypoints(stage, camera, range(60), stands=True) for camera in (first, second))
     assert not find_offset(ours, first, theirs, second).certain
     assert find_offset(ours, first, theirs, second, given=0.2).seconds == 0.2
+
+
+@pytest.mark.parametrize(("shown", "begin", "end"), [(20, 0, 90), (20, 0, 20), (40, 15, 90), (40, 60, 90)])
+def test_films_that_share_less_than_a_second_do_not_give_the_time(stage, shown, begin, end):
+    first, second = stage.camera, stage.beside[0]
+    ours, theirs = keypoints(stage, first, range(shown)), keypoints(stage, second, range(begin, end))
+    found = find_offset(ours, first, theirs, second)
+    assert not found.certain
+    films = [Film("film", first, {0: ours}, 0), Film("other", second, {0: theirs}, 0)]
+    with pytest.raises(UserError, match="which both must show for over 1 s; give --offsets"):
+        synchronise(films[:1], films[1], None)
+
+
+@pytest.mark.parametrize("noise", [2, 4])
+def test_noise_does_not_separate_films_that_began_together(stage, noise):
+    first, second = stage.camera, stage.beside[0]
+    ours, theirs = (keypoints(stage, camera, range(90), noise=noise) for camera in (first, second))
+    films = [Film("film", first, {0: ours}, 0), Film("other", second, {0: theirs}, 0)]
+    _, found, words = synchronise(films[:1], films[1], None)
+    assert found.seconds == 0 and "began together" in words
+    assert f"estimated from the person's motion to {found.margin:.2f} s" in words
+    late = keypoints(stage, second, range(7, 90), noise=noise)
+    found = find_offset(ours, first, late, second)
+    assert abs(found.seconds - 7 / FPS) <= found.margin <= 0.15
+
+
+def test_the_offset_is_from_more_frames_than_are_tracked(stage, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    cameras = {"a.mp4": stage.camera, "b.mp4": stage.beside[0]}
+    for film, camera in cameras.items():
+        write_camera(tmp_path / f"{film}.json", camera)
+        with VideoWriter(film, FPS) as writer:
+            for _ in range(90):
+                writer.write(np.full((480, 640, 3), 90, np.uint8))
+
+    def detected(options, video, frames):
+        found = keypoints(stage, cameras[str(options.video)], range(90))
+        return {4: found.part(slice(frames.start, frames.stop))}, 4
+
+    monkeypatch.setattr(scene, "_detect", detected)
+    monkeypatch.setattr(scene, "_require_detector", lambda options: None)
+    monkeypatch.setattr(scene, "detects", lambda options: True)
+    options = ClipOptions("a.mp4", "a.mp4.json", "t.csv", background="none", stabilize="off", quiet=True)
+    options = replace(options, further=(("b.mp4", "b.mp4.json"),))
+    for start, stop in ((0, 20), (75, 90)):
+        few = replace(options, start=start, stop=stop)
+        alone = scene.Scene.read(few)
+        assert alone.people[4].frame.tolist() == list(range(start, stop))
+        assert with_further_cameras(few, alone).began[0].startswith("began together with the first film")
+        given = scene.Scene.read(replace(few, offsets=(0.0,)))
+        assert len(given.longer[4].frame) == stop - start  # more would take time for nothing
 
 
 class _Drawing(Video):

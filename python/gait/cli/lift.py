@@ -236,7 +236,10 @@ def _add_video(group: argparse._ArgumentGroup) -> None:
         help="first frame to use (default: that of --placement, or 0)",
     )
     group.add_argument(
-        "--stop", type=values.whole(0), metavar="F", help="first frame not to use (default: to the end)"
+        "--stop",
+        type=values.whole(0),
+        metavar="F",
+        help="first frame not to use (default: to the end); of several films, like --start, of the first",
     )
 
 
@@ -420,7 +423,8 @@ def _filmed(
     for (path, camera), clip in zip(_views(args), clips, strict=True):
         found = None if views else in_video
         if views and _is_video(path, False):
-            found = _detect(args, prior, path, camera)
+            whole = argparse.Namespace(**{**vars(args), "start": None, "stop": None})
+            found = _detect(whole, prior, path, camera)
         people = {str(id): one for id, one in found.people.items()} if found else None
         views.append(FilmedView(path, camera, people, clip, found.still if found else None))
     return views

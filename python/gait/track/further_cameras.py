@@ -136,4 +136,4 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
 
 def _film(scene: Scene) -> Film[int]:
     video = None if scene.poses or scene.moved else scene.video
-    return Film(str(scene.video.path), scene.camera, scene.people, scene.person, video)
+    return Film(str(scene.video.path), scene.camera, scene.longer, scene.person, video)

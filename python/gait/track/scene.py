@@ -53,6 +53,9 @@ _SHAPES = 16  # frames searched for people's shapes, which is slow
 _TRUNK_HEIGHTS = (0.52, 0.81)  # of hips and shoulders, fractions of a person's height
 _TRUNK_HALF_WIDTH = 0.2  # of a trunk seen from the side, as a fraction of its height
 _FILLED = 0.72  # of the pictures' sides; all points of a copy of two thirds of their size or less are within
+_FOR_OFFSETS_S = (
+    10.0  # seconds of a film from which time offsets of others are estimated, or its frames to track
+)
 _STAYS = 0.45  # share of a clip's frames from which the median may show a person
 
 
@@ -93,6 +96,8 @@ class Scene:
         When each of them began, seconds after the first film.
     turn : float or None
         How far the camera turns although it counts as still, as for `turn_in_samples`; 0 if it does not.
+    longer : dict of int to Keypoints
+        `people` also in frames that are not tracked, from which time offsets are estimated.
     against_camera : str
         How the camera file contradicts the walk, in words; empty if it does not.
     """
@@ -113,6 +118,7 @@ class Scene:
     began: tuple[str, ...] = ()
     offsets: tuple[float, ...] = ()
     turn: float | None = 0.0
+    longer: dict[int, Keypoints] = field(default_factory=dict)
     against_camera: str = ""
 
     @property
@@ -194,9 +200,12 @@ class Scene:
             if options.keypoints:
                 people, person = {0: _read_keypoints(options, video, model, frames)}, 0
             else:
-                people, person = _detect(options, video, frames)
+                people, person = _detect(options, video, _frames_to_detect(options, video, frames))
             if beside is not None:
                 samples, plate = beside.result()
+        longer = people
+        if options.further:
+            people, person = _in_frames(people, person, frames)
         motion: CameraTurns | None = None
         turn: float | None = 0.0
         if not options.camera_path:
@@ -217,9 +226,8 @@ class Scene:
                 person = _who_starts(options, people, person, camera, model, frames, poses)
             _require_feet(people[person], video)
         sure = {id: keypoint_noise(found) for id, found in people.items()}
-        scene = Scene(
-            video, camera, model, plate, motion, frames, people, person, sure, calibration, turn=turn
-        )
+        scene = Scene(video, camera, model, plate, motion, frames, people, person, sure, calibration)
+        scene = replace(scene, longer=longer, turn=turn)
         return replace(scene, against_camera=_against_camera(options, scene)) if starts else scene
 
 
@@ -523,6 +531,31 @@ def one_is_grey(image: Image, plate: Image) -> bool:
     """Whether one of two BGR pictures is entirely grey and the other in colour."""
     colour = [float(np.median(np.ptp(one[::4, ::4], axis=2))) for one in (image, plate)]
     return min(colour) == 0 and max(colour) > _COLOUR_LEVELS
+
+
+def _frames_to_detect(options: ClipOptions, video: Video, frames: range) -> range:
+    """Return the frames to track, and more around few of them if time offsets are to be estimated."""
+    if not options.further or options.offsets is not None:
+        return frames
+    wanted = round(_FOR_OFFSETS_S * video.fps)
+    stop = min(max(frames.stop, frames.start + wanted), video.count)
+    return range(max(min(frames.start, stop - wanted), 0), stop)
+
+
+def _in_frames(people: dict[int, Keypoints], person: int, frames: range) -> tuple[dict[int, Keypoints], int]:
+    """Cut keypoints to `frames`; return them and the main person: `person` if nothing is cut."""
+    if all(one.frame[0] in frames and one.frame[-1] in frames for one in people.values()):
+        return people, person
+    from gait.detect.people import main_person  # here, as it loads the networks' runtime
+
+    visible = {}
+    for id, one in people.items():
+        rows = np.flatnonzero(
+            (one.frame >= frames.start) & (one.frame < frames.stop) & one.visible.any(axis=1)
+        )
+        if len(rows):
+            visible[id] = one.part(slice(rows[0], rows[-1] + 1))
+    return visible, main_person(visible) if visible else -1
 
 
 def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:

@@ -27,8 +27,10 @@ if TYPE_CHECKING:  # imports PyAV, not needed for files of keypoints
 
 Array = NDArray[np.float64]
 
-_OVERLAP = 1.0  # least seconds that both films must show
-_SHARE = 0.3  # least share of the shorter film that both must show
+_OVERLAP_S = 1.0  # seconds; least time that both films must show at the offset found
+_COMPARED_S = 0.5  # seconds; least time that both films must show at offsets compared with it
+_SHARE = 0.3  # of the shorter film; least time, as `_COMPARED_S`
+_VISIBLE = 1 / 3  # of this time; least part in which rays are known
 _MOST_FRAMES = 300  # most frames compared
 LONGEST_GAP_S = 0.15  # seconds; keypoints are not interpolated across longer gaps
 _LEAST_SINE = 0.05  # of the angle between a ray and the direction to the other camera
@@ -36,7 +38,10 @@ _OTHER_OFFSET_S = 0.2  # seconds; offsets further from the best count as others
 _CLEAR_RATIO = 1.25  # least ratio of any other offset's mismatch to the best one's
 _SAME_PLACE_M = 0.01  # metres between two cameras; from nearer by, their rays give no distance
 _FINE = 10  # steps per frame of the final search
-_TOGETHER = 1.1  # films began together if that has up to this times the best mismatch, a frame away
+_AS_WELL = 1.15  # offsets with up to this times the best mismatch fit about as well
+_TOGETHER_FRAMES = (
+    1.5  # films began together if that is less than this from the best offset, and fits as well
+)
 _TOGETHER_S = 0.005  # seconds; films that began less apart began together
 
 
@@ -77,15 +82,18 @@ class Offset:
     mismatch : float
         Angle between rays and epipolar planes, degrees.
     certain : bool
-        Whether all other offsets fit clearly worse.
+        Whether the films show enough at this offset and all others fit clearly worse.
     source : str
         What showed it: the person's ``motion``, or their ``silhouette``, then to some milliseconds.
+    margin : float
+        Of an offset by motion: how far away offsets fit about as well, seconds.
     """
 
     seconds: float
     mismatch: float
     certain: bool
     source: str = "motion"
+    margin: float = 0.0
 
 
 def require_apart(paths: Sequence[str], cameras: Sequence[Camera]) -> None:
@@ -118,8 +126,9 @@ def synchronise(films: Sequence[Film[Id]], other: Film[Id], given: float | None)
     person, offset = same_person(first, other, given)
     if given is None and not offset.certain:
         raise UserError(
-            f"{other.path}: its time offset from {first.path} cannot be estimated from the person's motion; "
-            "give --offsets, the seconds by which each further film began later, and check the cameras"
+            f"{other.path}: its time offset from {first.path} cannot be estimated from the person's motion, "
+            f"which both must show for over {_OVERLAP_S:.0f} s; give --offsets, the seconds by which each "
+            "further film began later, and check the cameras"
         )
     if given is None:
         offset = _improved(offset, first, other, person)
@@ -150,14 +159,14 @@ def same_person(first: Film[Id], other: Film[Id], given: float | None) -> tuple[
     found: dict[Id, Offset] = {}
     person = first.people.get(first.person)
     for id, keypoints in other.people.items():
-        if person is None or len(keypoints.time) < 2:
+        if person is None or min(len(person.time), len(keypoints.time)) < 2:
             continue
         one = find_offset(person, first.camera, keypoints, other.camera, given)
         if one is not None:
             found[id] = one
     if not found:
         return other.person, Offset(given or 0.0, np.nan, False)
-    id = min(found, key=lambda id: found[id].mismatch)
+    id = min(found, key=lambda id: (not found[id].certain, found[id].mismatch))
     return id, found[id]
 
 
@@ -166,6 +175,7 @@ def _words(offset: Offset, given: bool) -> str:
     if offset.seconds != 0:
         when = f"{abs(offset.seconds):.3f} s {'after' if offset.seconds > 0 else 'before'} the first film"
     how = "as given" if given else f"estimated from the person's {offset.source}"
+    how += f" to {offset.margin:.2f} s" if not given and offset.source == "motion" else ""
     fit = "" if np.isnan(offset.mismatch) else f" (joints fit to {offset.mismatch:.1f} deg)"
     return f"began {when}, {how}{fit}"
 
@@ -187,7 +197,7 @@ def find_offset(
     Parameters
     ----------
     first, other : Keypoints
-        Keypoints of the same person in two films, pixels.
+        Keypoints of the same person in two films, pixels; at least two frames.
     first_camera, camera : Camera
         Their cameras, in the same world.
     given : float, optional
@@ -201,29 +211,38 @@ def find_offset(
     names = [name for name in first.names if name in other.names]
     planes, times = _planes(first, names, first_camera, camera.centre - first_camera.centre)
     rays = _rays(other, names, camera)
-    if given is not None:
-        mismatch = _mismatch(planes, times, rays, other.time, given)
-        return Offset(given, mismatch, True) if np.isfinite(mismatch) else None
     step = float(np.median(np.diff(first.time)))
-    span = min(np.ptp(first.time), np.ptp(other.time))
-    least = max(_OVERLAP, _SHARE * span)
-    low, high = times[0] - other.time[-1] + least, times[-1] - other.time[0] - least
-    if len(names) == 0 or low > high:
-        return None
+    compared = max(_COMPARED_S, _SHARE * min(np.ptp(first.time), np.ptp(other.time)))
+    fewest = int(_VISIBLE * compared / np.median(np.diff(times))) * len(names)
+
+    def mismatch(offset: float) -> float:
+        return _mismatch(planes, times, rays, other.time, offset, fewest)
+
+    if given is not None:
+        fit = mismatch(given)
+        return Offset(given, fit, True) if np.isfinite(fit) else None
+    low, high = times[0] - other.time[-1], times[-1] - other.time[0]
     offsets = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
-    coarse = np.array([_mismatch(planes, times, rays, other.time, offset) for offset in offsets])
-    if not np.isfinite(coarse).any():
+    shown = np.minimum(times[-1], other.time[-1] + offsets) - np.maximum(times[0], other.time[0] + offsets)
+    offsets, shown = offsets[shown > compared - step], shown[shown > compared - step]
+    coarse = np.array([mismatch(offset) for offset in offsets])
+    known = np.flatnonzero(np.isfinite(coarse))
+    if len(known) == 0:
         return None
-    at = float(offsets[np.nanargmin(coarse)])
-    elsewhere = coarse[np.abs(offsets - at) > _OTHER_OFFSET_S]
+    best = int(np.nanargmin(coarse))
+    at = float(offsets[best])
     fine = at + step * np.arange(-_FINE, _FINE + 1) / _FINE
-    near = np.array([_mismatch(planes, times, rays, other.time, offset) for offset in fine])
-    best = float(np.nanmin(near))
-    certain = not bool((elsewhere < _CLEAR_RATIO * best).any())
-    together = _mismatch(planes, times, rays, other.time, 0.0)
-    if abs(at) < 1.5 * step and together < _TOGETHER * best:
-        return Offset(0.0, together, certain)
-    return Offset(float(fine[np.nanargmin(near)]), best, certain)
+    near = np.array([mismatch(offset) for offset in fine])
+    least = float(np.nanmin(near))
+    away = np.abs(offsets - at)
+    certain = not (coarse[away > _OTHER_OFFSET_S] < _CLEAR_RATIO * least).any()
+    certain &= bool(shown[best] > _OVERLAP_S - 1.5 * step and known[0] < best < known[-1])
+    # Interpolation averages noise, so offsets by whole frames are compared with each other.
+    as_well = coarse < _AS_WELL * coarse[best]
+    margin = max(step / 2, float(away[as_well & (away <= _OTHER_OFFSET_S)].max()))
+    if abs(at) < _TOGETHER_FRAMES * step and as_well[np.abs(offsets).argmin()]:
+        return Offset(0.0, mismatch(0.0), certain, margin=margin)
+    return Offset(float(fine[np.nanargmin(near)]), least, certain, margin=margin)
 
 
 def _planes(keypoints: Keypoints, names: list[str], camera: Camera, baseline: Array) -> tuple[Array, Array]:
@@ -272,12 +291,14 @@ def neighbours(own: Array, times: Array) -> tuple[NDArray[np.intp], Array, NDArr
     return after, share, (share >= 0) & (share <= 1) & (end - begin < LONGEST_GAP_S)
 
 
-def _mismatch(planes: Array, times: Array, rays: Array, ray_times: Array, offset: float) -> float:
-    """Compute the mismatch of an offset, degrees; NaN if too few rays can be compared."""
+def _mismatch(
+    planes: Array, times: Array, rays: Array, ray_times: Array, offset: float, fewest: int
+) -> float:
+    """Compute the mismatch of an offset, degrees; NaN if less than `fewest` rays can be compared."""
     after, share, known = neighbours(ray_times, times - offset)
     between = rays[after - 1] + share[:, None, None] * (rays[after] - rays[after - 1])
     sine = (planes * between).sum(axis=-1)[known]
-    if np.isfinite(sine).sum() < _SHARE / 3 * planes.shape[1] * len(times):
+    if np.isfinite(sine).sum() < max(fewest, 1):
         return np.nan
     sine = sine[:, np.isfinite(sine).any(axis=0)]
     parts = np.nanmedian(np.abs(sine)), np.nanmedian(np.abs(sine - np.nanmedian(sine, axis=0)))
