@@ -218,14 +218,14 @@ def test_clips_are_counted_not_people(place, monkeypatch, capsys):
 @pytest.mark.parametrize("make", ["track", "lift"])
 def test_several_films_are_one_clip_and_all_their_files_count(place, capsys, make):
     """gait track and gait lift take these words, and fail because the films have a few bytes only."""
-    write_camera(place / "calib.json", view())
-    text = (
-        f'[[clip]]\nvideos = ["a.mp4", "b.mp4"]\ncameras = ["calib.json", "calib.json"]\nmake = ["{make}"]\n'
-    )
+    write_camera(place / "ca.json", view())
+    write_camera(place / "cb.json", view(height=1.9))
+    text = f'[[clip]]\nvideos = ["a.mp4", "b.mp4"]\ncameras = ["ca.json", "cb.json"]\nmake = ["{make}"]\n'
     [clip] = clips_of(place, text)
     words = clip.command(place)
-    films, camera = [str(place / "a.mp4"), str(place / "b.mp4")], ["--camera", str(place / "calib.json")]
-    assert clip.name == "a" and words[0] == make and words[1:3] == films and words[-4:] == 2 * camera
+    films = [str(place / "a.mp4"), str(place / "b.mp4")]
+    cameras = ["--camera", str(place / "ca.json"), "--camera", str(place / "cb.json")]
+    assert clip.name == "a" and words[0] == make and words[1:3] == films and words[-4:] == cameras
     before = clip.key()
     (place / "b.mp4").write_bytes(b"another")
     assert clip.key() != before
