@@ -275,7 +275,7 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
     for row in rows:
         if row.get("verdict"):
             page.words(f"{_called(row)}: {row['verdict']}.")
-        for words in filter(None, (row["error"], *_warnings(row))):
+        for words in filter(None, (row.get("error"), *_warnings(row))):
             page.words(f"{_called(row)}: {words}", "warning")
     return page.text()
 
