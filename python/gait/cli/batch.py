@@ -71,12 +71,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run all clips and summarise."""
     from gait.batch import project
-    from gait.batch.run import (
-        FAILED,
-        SEPARATOR,
-        Runner,
-        write_summary,
-    )  # reports missing extras before any clip is run
+
+    # reports missing extras before any clip is run
+    from gait.batch.run import FAILED, SEPARATOR, Runner, write_summary
 
     if args.dask and args.jobs:
         raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")

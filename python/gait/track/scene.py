@@ -53,9 +53,7 @@ _SHAPES = 16  # frames searched for people's shapes, which is slow
 _TRUNK_HEIGHTS = (0.52, 0.81)  # of hips and shoulders, fractions of a person's height
 _TRUNK_HALF_WIDTH = 0.2  # of a trunk seen from the side, as a fraction of its height
 _FILLED = 0.72  # of the pictures' sides; all points of a copy of two thirds of their size or less are within
-_FOR_OFFSETS_S = (
-    10.0  # seconds of a film from which time offsets of others are estimated, or its frames to track
-)
+_FOR_OFFSETS_S = 10.0  # seconds of a film, or its frames to track, that show time offsets of other films
 _STAYS = 0.45  # share of a clip's frames from which the median may show a person
 
 
