@@ -14,7 +14,6 @@
 #define USUAL_OF_TWO(meaning, type, name, array, unit, value, paper, low, high) .name = (type)(value),
 #define SET_PAPER(meaning, type, name, array, unit, value, paper, low, high)    full.name = (type)(paper);
 #define NO_DEFAULT(...)
-#define MOST_SD 10.0 /* of any field of a start's state */
 
 void gait_tracker_fill(gait_tracker_config *cfg, size_t cfg_bytes, gait_mode mode)
 {

@@ -5,7 +5,8 @@
 #include "model/kinematics.h"
 #include <string.h>
 
-#define LEAST_STATURE 0.3f /* metres: the smallest stature of a particle */
+#define LEAST_STATURE 0.3f  /* metres: the smallest stature of a particle */
+#define MOST_SD       10.0f /* of any field of the state from which particles are drawn */
 
 /* One float array per field. (X, Y) is the smooth path over the ground and Z the height of the ground under
  * the person; the pelvis follows from the model's sway and height (ROOT_*). */

@@ -24,7 +24,6 @@ static const float OPEN_SD = 0.9f;      /* radians of standard deviation from wh
 static const float BUILD_SHARE = 0.25f; /* of the sd of scores and posture while the phase is unknown */
 static const float SPEEDS_UP = 0.4f;    /* sd of a rate below the usual one, as a share of the difference */
 static const float LEAST_PLACE_SD = 0.05f; /* metres */
-static const float MOST_PLACE_SD = 10.0f;  /* metres; gait_tracker_start() takes no more */
 
 /* Steps of the finite differences that replace derivatives. */
 static const double STEP[N] = {0.02, 0.02, 0.03, 0.03, 0.01, 0.01, 0.01, 0.01, 0.1, 0.1, 0.1};
@@ -340,7 +339,7 @@ static void widen(const gait_start *s, gait_hypothesis *h)
     h->sd.stride_hz =
         f_max(h->sd.stride_hz, f_max(0.03f, SPEEDS_UP * (s->model->stride_hz - h->mean.stride_hz)));
     for (int32_t k = 0; k < 3; k++)
-        h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], LEAST_PLACE_SD, MOST_PLACE_SD);
+        h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], LEAST_PLACE_SD, MOST_SD);
 }
 
 /* Widen the standard deviations of what boxes do not determine; returns what this adds to the covariance of x and y. */
@@ -356,7 +355,7 @@ static double leave_open(const gait_start *s, const start_candidate *c, gait_hyp
     for (int32_t k = 0; k < 2; k++) {
         double const own = (double)h->sd.pelvis[k];
         h->sd.pelvis[k] =
-            f_clamp(root(own * own + along * (double)(ray[k] * ray[k])), LEAST_PLACE_SD, MOST_PLACE_SD);
+            f_clamp(root(own * own + along * (double)(ray[k] * ray[k])), LEAST_PLACE_SD, MOST_SD);
     }
     if (c->in_place) {
         h->mean.stride_hz = s->model->stride_hz;
