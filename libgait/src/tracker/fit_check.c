@@ -1,6 +1,5 @@
 #include "tracker/fit_check.h"
 #include "base/fmath.h"
-#include "likelihood/likelihood.h"
 #include "tracker/likelihood_step.h"
 
 static const float AVERAGE_TIME = 0.7f; /* seconds over which the score is averaged */
@@ -15,9 +14,9 @@ enum { ESTIMATE = 3, BEHIND = 7, AHEAD, BODIES };
 
 float fit_check_score(gait_tracker *t, const state_layout *of, const particle_state *p)
 {
-    likelihood_scratch *const w = &t->work[0];
     int32_t const n = of->model->direction == 0 ? BEHIND : BODIES;
-    float support[BODIES] = {0.0f}, best = -INFINITY;
+    body_evidence e[BODIES];
+    float best = -INFINITY;
     particle_block bodies;
     particle_set all = {.n = BLOCK, .fields = F_MAX, .value = bodies.f[0]};
     for (int32_t lane = 0; lane < BLOCK; lane++) {
@@ -28,21 +27,11 @@ float fit_check_score(gait_tracker *t, const state_layout *of, const particle_st
             one.f[F_PHASE] = m_wrap1(one.f[F_PHASE] + (lane == AHEAD ? 0.25f : -0.25f));
         particle_put(&all, lane, &one);
     }
-    particle_block_bodies(of, &bodies, &w->body);
-    if (t->cfg.terms & GAIT_TERM_KEYPOINTS)
-        kin_points(t->model, &w->body, w->points);
-    for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        if (!t->camera[c].features.has_image)
-            continue;
-        likelihood_outline(t, c, w);
-        for (int32_t lane = 0; lane < n; lane++) {
-            like_body const b = likelihood_body(t, c, 0, lane, w, NULL);
-            support[lane] += like_support(&b);
-        }
-    }
+    particle_block_bodies(of, &bodies, &t->work[0].body);
+    likelihood_of_bodies(t, n, NULL, e);
     for (int32_t lane = 0; lane < n; lane++)
-        best = lane == ESTIMATE ? best : f_max(best, support[lane]);
-    return support[ESTIMATE] - best;
+        best = lane == ESTIMATE ? best : f_max(best, e[lane].support);
+    return e[ESTIMATE].support - best;
 }
 
 float fit_check_update(gait_tracker *t, bool restart, const state_layout *of, const particle_state *mean)

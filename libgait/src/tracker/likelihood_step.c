@@ -190,27 +190,35 @@ void likelihood_step(gait_tracker *t)
 }
 
 /* ---- any body ---- */
-COLD body_evidence likelihood_of_particle(gait_tracker *t, const state_layout *of, const particle_state *p)
+COLD void likelihood_of_bodies(gait_tracker *t, int32_t n, like_patch *first, body_evidence *e)
 {
     likelihood_scratch *const w = &t->work[0];
-    body_evidence e = {.support = 0.0f};
-    particle_body(of, p, &w->body);
+    memset(e, 0, (size_t)n * sizeof *e);
     if (t->cfg.terms & GAIT_TERM_KEYPOINTS)
         kin_points(t->model, &w->body, w->points);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].features.has_image)
             continue;
         likelihood_outline(t, c, w);
-        like_patch *const samples = t->estimate_patch ? t->estimate_patch + c * t->like->limbs : NULL;
-        like_body const b = likelihood_body(t, c, 0, 0, w, samples);
-        like_parts const parts = like_silhouette_parts(&b);
-        e.support += like_support(&b);
-        if (t->cfg.terms & GAIT_TERM_KEYPOINTS)
-            e.by_keypoints += t->like->weight[LIKE_KEYPOINTS] * like_keypoints.support(&b);
-        e.parts.explained += parts.explained;
-        e.parts.missed += parts.missed;
-        e.chance += like_silhouette_chance(&b);
+        for (int32_t lane = 0; lane < n; lane++) {
+            like_patch *const samples = first && lane == 0 ? first + c * t->like->limbs : NULL;
+            like_body const b = likelihood_body(t, c, 0, lane, w, samples);
+            like_parts const parts = like_silhouette_parts(&b);
+            e[lane].support += like_support(&b);
+            if (t->cfg.terms & GAIT_TERM_KEYPOINTS)
+                e[lane].by_keypoints += t->like->weight[LIKE_KEYPOINTS] * like_keypoints.support(&b);
+            e[lane].parts.explained += parts.explained;
+            e[lane].parts.missed += parts.missed;
+            e[lane].chance += like_silhouette_chance(&b);
+        }
     }
+}
+
+COLD body_evidence likelihood_of_particle(gait_tracker *t, const state_layout *of, const particle_state *p)
+{
+    body_evidence e;
+    particle_body(of, p, &t->work[0].body);
+    likelihood_of_bodies(t, 1, t->estimate_patch, &e);
     return e;
 }
 

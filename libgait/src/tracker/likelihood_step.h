@@ -17,6 +17,10 @@ typedef struct body_evidence { /* of one body, over all cameras */
     float chance;       /* foreground that a body explains by chance, nats */
 } body_evidence;
 
+/* Evidence e for each of the first `n` bodies in t->work[0].body.  first: receives the surface samples of the first, cameras
+ * x limbs; or NULL. */
+void likelihood_of_bodies(gait_tracker *t, int32_t n, like_patch *first, body_evidence *e);
+
 /* Evidence for one body, of the class of layout `of`.  Writes its surface samples to t->estimate_patch. */
 body_evidence likelihood_of_particle(gait_tracker *t, const state_layout *of, const particle_state *p);
 
