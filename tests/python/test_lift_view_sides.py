@@ -8,6 +8,7 @@ import pytest
 import walking_keypoints as walking
 
 from gait.bindings.segment_prior import SegmentPrior
+from gait.camera import synchronise
 from gait.camera.camera import Camera, write_camera
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
@@ -17,7 +18,6 @@ from gait.lift.run import FilmedView, Lifted, Request
 from gait.lift.segment.view import Several
 from gait.lift.smooth.options import Options
 from gait.lift.view_sides import best_sides
-from gait.track import synchronise
 
 CAMERAS = (walking.view(), Camera.looking((6.0, 5.0, 1.6), (0.3, 5.5, 0.9), walking.SIZE, 1000.0))
 LEGS = ("hip", "knee", "ankle", "heel", "toe")

@@ -12,6 +12,8 @@ import pytest
 from gait import Video, VideoWriter
 from gait.body.skeleton import axis_rotation
 from gait.camera.camera import read_camera, write_camera
+from gait.camera.silhouette_offset import Filmed, silhouette_offset
+from gait.camera.synchronise import Film, find_offset, synchronise
 from gait.cli import main
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
@@ -24,8 +26,6 @@ from gait.track import scene
 from gait.track.clip import ClipOptions
 from gait.track.further_cameras import SeveralVideos, with_further_cameras
 from gait.track.person_keypoints import PersonKeypoints
-from gait.track.silhouette_offset import Filmed, silhouette_offset
-from gait.track.synchronise import Film, find_offset, synchronise
 
 FRAMES, FPS = 30, 30.0
 SCENARIO = replace(PRESETS["toward"], frames=FRAMES, size=(160, 120), cameras=2)

@@ -37,6 +37,7 @@ EVAL15 = ["pelvis", "neck", "head_top"] + [
     f"{s}_{j}" for j in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for s in SIDES
 ]
 JOINTS = EVAL15 + [f"{s}_{j}" for j in ("toe", "heel") for s in SIDES]
+_USUAL_DISTANCE = 0.04  # person's heights in the picture; of a keypoint from its joint
 #: In the order of drawing.
 BONES = (
     *(("pelvis", "neck"), ("neck", "head_top")),
@@ -145,6 +146,28 @@ def side_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
     """Columns of left and right of the points that have both."""
     pairs = zip(range(len(names)), other_sides(names), strict=True)
     return [(left, right) for left, right in pairs if names[left].startswith("l_") and left != right]
+
+
+def mistaken_sides(
+    uv: Floats, expected: Floats, names: Sequence[str], tall: Floats | float
+) -> npt.NDArray[np.bool_]:
+    """Whether (...) keypoints of a frame fit the expected ones better with left and right swapped.
+
+    Parameters
+    ----------
+    uv, expected : (..., J, 2)
+        Pixels; NaN where not found.
+    names : sequence of str
+        Names of the J joints.
+    tall : (...)
+        The person's height in the picture, pixels.
+    """
+    usual = _USUAL_DISTANCE * np.asarray(tall)[..., None]
+    kept, other = (
+        np.nansum(np.log1p(np.sum((points - expected) ** 2, axis=-1) / usual**2), axis=-1)
+        for points in (uv, uv[..., other_sides(names), :])
+    )
+    return np.asarray(other < kept)
 
 
 def _mirror(v: tuple[float, float, float], side: str) -> tuple[float, float, float]:

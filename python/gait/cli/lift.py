@@ -436,8 +436,8 @@ def _clips(args: argparse.Namespace) -> list[Clip]:
     UserError if cameras of several views are at the same place.
     """
     from gait.camera.camera import Camera
+    from gait.camera.synchronise import require_apart
     from gait.io.detections import Clip
-    from gait.track.synchronise import require_apart
 
     size = times = None
     if args.video:

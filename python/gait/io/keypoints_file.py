@@ -37,6 +37,7 @@ LASTS = 1.0  # seconds for which a lasting error counts as one observation, unle
 TYPICAL_STRIDE_S = 1.1  # seconds; typical stride time
 LONGEST_STEP = 1.0  # seconds between frames; about one stride
 SHORTEST_STEP = 1e-5  # seconds between frames; no camera is this fast
+LONGEST_KEYPOINT_GAP_S = 0.15  # seconds; keypoints are not interpolated across longer gaps
 LONGEST_ROW_GAP_S = 10.0  # seconds without a row that lifting bridges; nothing is known in the middle of it
 RATE_DIFFERENCE = 0.05  # relative difference between the rates of keypoints and video; phones vary less
 MOST_OUTSIDE_SHARE = 0.5  # share of the points outside the pictures from which they are of another size
@@ -201,6 +202,32 @@ class Keypoints:
         """Return `frame_sd` or, where it is unknown, `standard_deviations`."""
         found = self.standard_deviations(sd)
         return found if self.frame_sd is None else np.where(np.isfinite(self.frame_sd), self.frame_sd, found)
+
+
+def neighbours(own: Array, times: Array) -> tuple[NDArray[np.intp], Array, NDArray[np.bool_]]:
+    """Find the frames of a film between which its keypoints are interpolated at other times.
+
+    Parameters
+    ----------
+    own : (T,)
+        Times of the film's frames, seconds; at least two.
+    times : (..., n)
+        Seconds after the film began.
+
+    Returns
+    -------
+    after : (..., n)
+        The later of the two frames; the other one is the frame before it.
+    share : (..., n)
+        Weight of the later frame.
+    known : (..., n)
+        Whether the time is between the two, which are less than `LONGEST_KEYPOINT_GAP_S` apart.
+    """
+    after = np.searchsorted(own, times).clip(1, len(own) - 1)
+    begin, end = own[after - 1], own[after]
+    share = (times - begin) / (end - begin)
+    share = np.where(np.abs(share) < 1e-6, 0.0, np.where(np.abs(share - 1) < 1e-6, 1.0, share))
+    return after, share, (share >= 0) & (share <= 1) & (end - begin < LONGEST_KEYPOINT_GAP_S)
 
 
 def read(

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from gait.bindings.segment_prior import SegmentPrior
 from gait.bindings.state import state_range
 from gait.camera.camera import Camera
+from gait.camera.synchronise import Film, no_shared_frame, same_person, synchronise
 from gait.counts import count_of
 from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.detections import Clip
-from gait.io.keypoints_file import Keypoints
+from gait.io.keypoints_file import LONGEST_KEYPOINT_GAP_S, Keypoints
 from gait.lift.keypoints import noise, swaps
 from gait.lift.keypoints.corrections import Edits, corrected, pins, read_edits
 from gait.lift.keypoints.joined import joined
@@ -29,7 +30,6 @@ from gait.lift.view_sides import best_sides
 from gait.progress import note, progress
 from gait.reproducible import one_thread
 from gait.track.from_walk import Calibration
-from gait.track.synchronise import LONGEST_GAP_S, Film, no_shared_frame, same_person, synchronise
 
 if TYPE_CHECKING:  # imports PyAV, not needed for files of keypoints
     from gait.io.video import Video
@@ -254,10 +254,10 @@ def lift_views(
         person = _person(people, films, own, given, named)
         keypoints = people[person]
         step = float(np.median(np.diff(keypoints.time))) if len(keypoints.time) > 1 else 0.0
-        if films and step >= LONGEST_GAP_S:
+        if films and step >= LONGEST_KEYPOINT_GAP_S:
             raise UserError(
                 f"{path}: its frames are {step:.2g} s apart; of several views only the first may have fewer "
-                f"than {np.ceil(1 / LONGEST_GAP_S):.0f} a second"
+                f"than {np.ceil(1 / LONGEST_KEYPOINT_GAP_S):.0f} a second"
             )
         one = prepare(path, keypoints, prior, own, named, quiet, sides_later=not request.keep_sides)
         assert isinstance(one.view, Perspective)

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.bindings.segment_prior import SegmentPrior
-from gait.body.skeleton import other_sides
+from gait.body.skeleton import mistaken_sides, other_sides
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.lift.keypoints import swaps
@@ -28,7 +28,6 @@ from gait.lift.smooth.motion import Motion
 from gait.lift.smooth.options import Options
 from gait.progress import progress
 from gait.reproducible import one_thread
-from gait.track.measured_joints import mistaken_sides
 
 Floats = npt.NDArray[np.float64]
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.camera.camera import Camera
+from gait.camera.synchronise import Film, no_shared_frame, require_apart, synchronise
 from gait.errors import UserError
 from gait.io.video import Frame, Video
 from gait.progress import note
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene, require_scene, stays
-from gait.track.synchronise import Film, no_shared_frame, require_apart, synchronise
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints
-from gait.body.skeleton import other_sides
+from gait.body.skeleton import mistaken_sides, other_sides
 from gait.camera.camera import Camera
 from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
@@ -34,7 +34,6 @@ Array = NDArray[np.float64]
 
 STUDENT_DEGREES = 4.0  # of freedom, of a keypoint's errors
 _ROUNDS = 4  # of robust weights and linearisation
-_USUAL = 0.04  # person's heights in the picture; usual distance of a keypoint from its joint
 _HIPS = ("l_hip", "r_hip")
 _LEAST_VIEWS = 2
 #: Seconds, sd of the weights over time: half as long as a detector's errors last.
@@ -162,25 +161,3 @@ def posterior(sd: Array, precision: Array, pull: Array) -> tuple[Array, Array]:
     whole = np.eye(3) / np.maximum(sd, 1e-6)[:, :, None] ** 2 + precision
     moves = np.linalg.solve(whole, pull[..., None])[..., 0]
     return moves, np.sqrt(np.linalg.inv(whole).diagonal(axis1=1, axis2=2))
-
-
-def mistaken_sides(
-    uv: Array, expected: Array, names: Sequence[str], tall: Array | float
-) -> NDArray[np.bool_]:
-    """Whether (...) keypoints of a frame fit the expected ones better with left and right swapped.
-
-    Parameters
-    ----------
-    uv, expected : (..., J, 2)
-        Pixels; NaN where not found.
-    names : sequence of str
-        Names of the J joints.
-    tall : (...)
-        The person's height in the picture, pixels.
-    """
-    usual = _USUAL * np.asarray(tall)[..., None]
-    kept, other = (
-        np.nansum(np.log1p(np.sum((points - expected) ** 2, axis=-1) / usual**2), axis=-1)
-        for points in (uv, uv[..., other_sides(names), :])
-    )
-    return np.asarray(other < kept)

@@ -24,14 +24,14 @@ from gait.bindings.model import Model, read_cyclic
 from gait.body import skeleton
 from gait.body.displaced import PARTS, displaced, effects
 from gait.body.model_curves import curves
-from gait.body.skeleton import other_sides
+from gait.body.skeleton import mistaken_sides, other_sides
 from gait.camera.camera import Camera
 from gait.detect.profile import load, picture_height
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame
-from gait.track.measured_joints import STUDENT_DEGREES, mistaken_sides
+from gait.track.measured_joints import STUDENT_DEGREES
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.io.keypoints_file import Keypoints
-from gait.track.synchronise import neighbours
+from gait.io.keypoints_file import Keypoints, neighbours
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.bindings.segment_prior import SegmentPrior
+from gait.io.keypoints_file import LONGEST_KEYPOINT_GAP_S
 
 Floats = npt.NDArray[np.float64]
-LONGEST_KEYPOINT_GAP_S = 0.15  # seconds; keypoints are not interpolated across longer gaps
 
 
 @dataclass(frozen=True)

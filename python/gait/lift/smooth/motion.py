@@ -24,10 +24,9 @@ from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import GaitError, UsageError, UserError
-from gait.io.keypoints_file import Keypoints
+from gait.io.keypoints_file import LONGEST_KEYPOINT_GAP_S, Keypoints
 from gait.lift.keypoints.corrections import Pins
 from gait.lift.keypoints.observations import (
-    LONGEST_KEYPOINT_GAP_S,
     Grid,
     Observations,
     interpolated,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from gait.camera.camera import Camera
-from gait.io.keypoints_file import Keypoints
+from gait.io.keypoints_file import Keypoints, neighbours
 from gait.io.video import Image, Video
 from gait.reproducible import one_opencv_thread
 
@@ -32,7 +32,6 @@ _COVERED, _SEARCHED = 0.06, 0.15  # margins around a person: of what they cover,
 _CHANGE = 24  # grey levels; least difference from the empty scene
 _CLOSED_PX = 5  # pixels; narrower gaps in a silhouette are closed
 _LONGEST_S = 10.0  # seconds compared
-_LONGEST_GAP_S = 0.15  # seconds; angles are not interpolated across longer gaps
 _FEWEST = 20  # fewest frames in which a plane is known in both films
 _REACH_S, _STEP_S = 0.1, 0.002  # seconds around the offset to improve, and between those compared
 _OUTLIER = 3.0  # robust standard deviations
@@ -192,13 +191,8 @@ def _costs(times: Array, angles: Array, other_times: Array, other_angles: Array,
     times, angles, observed = times[ours], angles[ours], other_times[theirs]
     curve = CubicSpline(observed, other_angles[theirs])
     wanted = times - offsets[:, None]
-    after = np.searchsorted(observed, wanted).clip(1, len(observed) - 1)
-    between = (
-        (wanted >= observed[0])
-        & (wanted <= observed[-1])
-        & (observed[after] - observed[after - 1] < _LONGEST_GAP_S)
-    )
-    shared = between.all(axis=0)
+    inside = (wanted >= observed[0]) & (wanted <= observed[-1])  # the curve is not extrapolated
+    shared = (inside & neighbours(observed, wanted)[2]).all(axis=0)
     if shared.sum() < _FEWEST:
         return np.zeros(len(offsets))
     away = (angles - curve(wanted))[:, shared]

@@ -6,7 +6,7 @@ across these planes are off them.  Errors of the detector and the camera files l
 both the distances of rays from the planes and the changes of these distances from each joint's average.
 
 The detector's errors differ between views and repeat in each stride, so this offset is off by about half a
-frame.  If the cameras stand still, silhouettes in the films improve it (`gait.track.silhouette_offset`).
+frame.  If the cameras stand still, silhouettes in the films improve it (`gait.camera.silhouette_offset`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gait.camera.camera import Camera
 from gait.errors import UserError
-from gait.io.keypoints_file import Keypoints
+from gait.io.keypoints_file import Keypoints, neighbours
 
 if TYPE_CHECKING:  # imports PyAV, not needed for files of keypoints
     from gait.io.video import Video
@@ -32,7 +32,6 @@ _COMPARED_S = 0.5  # seconds; least time that both films must show at offsets co
 _SHARE = 0.3  # of the shorter film; least time, as `_COMPARED_S`
 _VISIBLE = 1 / 3  # of this time; least part in which rays are known
 _MOST_FRAMES = 300  # most frames compared
-LONGEST_GAP_S = 0.15  # seconds; keypoints are not interpolated across longer gaps
 _LEAST_SINE = 0.05  # of the angle between a ray and the direction to the other camera
 _OTHER_OFFSET_S = 0.2  # seconds; offsets further from the best count as others
 _CLEAR_RATIO = 1.25  # least ratio of any other offset's mismatch to the best one's
@@ -139,7 +138,7 @@ def _improved(offset: Offset, first: Film[Id], other: Film[Id], person: Id) -> O
     """Return the offset by the silhouettes if the films' pictures show it, otherwise `offset`."""
     if first.video is None or other.video is None:
         return offset
-    from gait.track.silhouette_offset import Filmed, silhouette_offset  # here, as it loads OpenCV
+    from gait.camera.silhouette_offset import Filmed, silhouette_offset  # here, as it loads OpenCV
 
     ours, theirs = first.people[first.person], other.people[person]
     seconds = silhouette_offset(
@@ -263,32 +262,6 @@ def _rays(keypoints: Keypoints, names: list[str], camera: Camera) -> Array:
     rays = camera.rays(np.where(visible[..., None], keypoints.uv[:, columns], 0.0))
     rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
     return np.asarray(np.where(visible[..., None], rays, np.nan))
-
-
-def neighbours(own: Array, times: Array) -> tuple[NDArray[np.intp], Array, NDArray[np.bool_]]:
-    """Find the frames of a film between which its keypoints are interpolated at other times.
-
-    Parameters
-    ----------
-    own : (T,)
-        Times of the film's frames, seconds; at least two.
-    times : (n,)
-        Seconds after the film began.
-
-    Returns
-    -------
-    after : (n,)
-        The later of the two frames; the other one is the frame before it.
-    share : (n,)
-        Weight of the later frame.
-    known : (n,)
-        Whether the time is between the two, which are less than `LONGEST_GAP_S` apart.
-    """
-    after = np.searchsorted(own, times).clip(1, len(own) - 1)
-    begin, end = own[after - 1], own[after]
-    share = (times - begin) / (end - begin)
-    share = np.where(np.abs(share) < 1e-6, 0.0, np.where(np.abs(share - 1) < 1e-6, 1.0, share))
-    return after, share, (share >= 0) & (share <= 1) & (end - begin < LONGEST_GAP_S)
 
 
 def _mismatch(
