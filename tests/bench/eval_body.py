@@ -33,7 +33,8 @@ from gait.progress import progress
 from gait.simulate.clip import simulate
 from gait.simulate.scenario import Scenario
 from gait.track.clip import ClipOptions, track_scene
-from gait.track.scene import Scene, first_state
+from gait.track.first_state import first_state
+from gait.track.read_scene import read_scene
 
 FOLDER = Path(__file__).resolve().parents[2] / "build" / "eval-body"
 VIEWS = "side", "oblique", "toward"
@@ -128,7 +129,7 @@ def measured(case: Case, seeds: int) -> Iterator[list[object]]:
         video, camera, str(FOLDER / f"{case.name}.csv"), model=case.model, height=body.stature,
         background=str(folder / "background.png"), quiet=True,
     )  # fmt: skip
-    plain = Scene.read(options)
+    plain = read_scene(options)
     known = replace(plain, model=Model(model_of(body, case.model)))
     for seed in range(1, seeds + 1):
         for arm, scene in (("stature", plain), ("limbs", known)):

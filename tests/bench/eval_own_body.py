@@ -33,9 +33,10 @@ from gait.motion.evaluate import evaluate
 from gait.motion.footfalls import strikes_of
 from gait.progress import progress
 from gait.track.clip import ClipOptions, track_scene
+from gait.track.first_state import first_state
 from gait.track.further_cameras import with_further_cameras
 from gait.track.own_body import FirstPass, own_model
-from gait.track.scene import Scene, first_state
+from gait.track.read_scene import read_scene
 
 DEVELOPMENT = "development"
 GROUPS = "table", "drawn", DEVELOPMENT
@@ -114,7 +115,7 @@ def measured(case: Case) -> dict[str, tuple[float, ...]]:
         str(case.folder / "video.mp4"), str(case.folder / "camera.json"), str(output), model=case.model,
         height=case.height, further=case.further, quiet=True,
     )  # fmt: skip
-    scene = with_further_cameras(options, Scene.read(options))
+    scene = with_further_cameras(options, read_scene(options))
     first, default = FirstPass(), TrackerConfig.default
     start = first_state(options, scene)
 

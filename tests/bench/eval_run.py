@@ -28,8 +28,9 @@ from gait.motion.evaluate import evaluate
 from gait.motion.footfalls import Strikes, strikes_of
 from gait.track.box_start import BoxStart
 from gait.track.clip import track_scene
+from gait.track.first_state import first_state
 from gait.track.options import ClipOptions
-from gait.track.scene import Scene, first_state
+from gait.track.read_scene import read_scene
 
 
 @dataclass
@@ -133,7 +134,7 @@ def _as_gait_track(job: Job) -> _Kept:
         detector="full" if arm.init == "auto" else "none",
         quiet=True,
     )
-    scene = Scene.read(options)
+    scene = read_scene(options)
     figures = track_scene(
         options,
         scene,

@@ -27,7 +27,8 @@ from gait.bindings.config import TrackerConfig
 from gait.io.track_file import read_estimates
 from gait.progress import progress
 from gait.track.clip import ClipOptions, track_scene
-from gait.track.scene import Scene, first_state
+from gait.track.first_state import first_state
+from gait.track.read_scene import read_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 WEIGHTS = (0.0, 2.0, 8.0, 32.0)
@@ -84,7 +85,7 @@ def _rows(clip: Clip, kind: str, model: str | None) -> list[list[object]]:
     with tempfile.TemporaryDirectory() as folder:
         out = str(Path(folder) / "track.csv")
         options = ClipOptions(str(clip.video), str(clip.folder / "camera.json"), out, model, quiet=True)
-        scene = Scene.read(options)
+        scene = read_scene(options)
         start = first_state(options, scene)
         for weight in WEIGHTS:
 

@@ -24,8 +24,9 @@ from facts import facts
 import gait.track.clip
 from gait import Tracker
 from gait.track.clip import track_scene
+from gait.track.first_state import first_state
 from gait.track.options import ClipOptions
-from gait.track.scene import Scene, first_state
+from gait.track.read_scene import read_scene
 
 FILMS = ("cane", "lab_away_w", "lab_side")
 MOST = 0.25  # share of a step
@@ -83,7 +84,7 @@ def _row(film: Path) -> list[object]:
             keypoints=str(film / "reference2d.csv"),
             quiet=True,
         )
-        scene = Scene.read(options)
+        scene = read_scene(options)
         track_scene(options, scene, first_state(options, scene))
     begun, ended, whole = 1000 * np.array(Timed.marks).T
     frames = len(begun) - 1

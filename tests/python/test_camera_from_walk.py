@@ -17,7 +17,7 @@ from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, write
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage
-from gait.track import scene
+from gait.track.clip_camera import calibrate_clip
 from gait.track.from_walk import calibrate
 from gait.track.options import ClipOptions
 from gait.track.walk_model import WalkingBody
@@ -128,10 +128,10 @@ def test_of_several_people_one_who_walks_gives_the_camera():
     walks, stands = keypoints(view()), keypoints(view(), (0.0, (0.0, 3.0)), standing=True)
     people = {1: walks, 2: stands}
     assert by_size(people)[0] == 2  # nearer
-    person, found = scene._calibrate(options, film, MODEL, people, None)
+    person, found = calibrate_clip(options, film, MODEL, people, None)
     assert person == 1 and found.camera.fx == pytest.approx(1000, rel=0.1)
     with pytest.raises(UserError, match="the person stands"):
-        scene._calibrate(options, film, MODEL, {2: stands}, None)
+        calibrate_clip(options, film, MODEL, {2: stands}, None)
 
 
 def test_a_treadmill_is_in_place():

@@ -128,7 +128,7 @@ def test_a_film_that_breaks_off_is_a_warning(scene, capsys, monkeypatch):
             super().__init__(path)
             self.broken = f"{path}: breaks off"
 
-    monkeypatch.setattr("gait.track.scene.Video", Cut)
+    monkeypatch.setattr("gait.track.read_scene.Video", Cut)
     assert track(scene, "--stop", 3) == 0
     assert capsys.readouterr().err.startswith(f"warning: {scene / 'walk.mp4'}: breaks off\n")
 

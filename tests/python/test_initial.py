@@ -18,7 +18,7 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_truth
 from gait.io.video import Frame
 from gait.track.box_start import BoxStart, find_start
-from gait.track.scene import one_is_grey, stays
+from gait.track.clip_background import one_is_grey, stays
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))

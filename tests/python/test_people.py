@@ -1,6 +1,7 @@
 """Several people in one clip: each has a track, although one hides the other."""
 
 import json
+from types import SimpleNamespace
 
 import accessibility
 import cv2
@@ -17,7 +18,8 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.report.colours import OVER_PICTURES, PERSON_COLOURS
-from gait.track import scene
+from gait.track import clip_keypoints
+from gait.track.first_state import who_starts
 from gait.track.options import ClipOptions
 from gait.track.other_people import OTHER, OtherPeople, Outline
 
@@ -58,7 +60,7 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
     hidden = np.flatnonzero(apart < 0.3)
     assert 4 < len(hidden) < 15
     people = {4: detected(joints[0], hidden), 7: detected(joints[1])}
-    monkeypatch.setattr(scene, "_detect", lambda *_: (people, 7))
+    monkeypatch.setattr(clip_keypoints, "_detect", lambda *_: (people, 7))
     write(tmp_path / "v.mp4", pictures)
     cv2.imwrite(str(tmp_path / "plate.png"), wall())
     (tmp_path / "camera.json").write_text(json.dumps(camera().to_dict()))
@@ -88,7 +90,10 @@ def test_a_start_takes_the_person_who_walks(crossing):
     options = ClipOptions("v.mp4", "camera.json", "t.csv")
 
     def chosen(people):
-        return scene._who_starts(options, people, main_person(people), camera(), MODEL, range(FRAMES), {})
+        seen = {"people": people, "person": main_person(people), "poses": {}}
+        return who_starts(
+            options, SimpleNamespace(camera=camera(), model=MODEL, frames=range(FRAMES), **seen)
+        )
 
     assert chosen({1: walks, 2: stands}) == 1
     assert chosen({2: stands}) == 2

@@ -16,7 +16,7 @@ from gait.detect.shapes import find_near
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.video import Frame
-from gait.track import person_shapes, scene
+from gait.track import clip_background, person_shapes
 from gait.track.box_start import find_start
 from gait.track.follow import Follower
 from gait.track.person_shapes import PersonShapes
@@ -78,12 +78,12 @@ def test_a_median_is_judged_by_shapes_too(monkeypatch, aside, taller, found, exp
     for k in range(16):
         foot = FOOT + [k * aside * tall, 0.02 * k * tall]
         boxes.append([] if k % found else [Box(foot, foot - [0, tall * taller**k], 1.0)])
-    monkeypatch.setattr(scene, "find_people", lambda image, stature: boxes[image])
+    monkeypatch.setattr(clip_background, "find_people", lambda image, stature: boxes[image])
     monkeypatch.setattr(
-        scene, "sample_frames", lambda video, count: [Frame(k, k / 30, k) for k in range(count)]
+        clip_background, "sample_frames", lambda video, count: [Frame(k, k / 30, k) for k in range(count)]
     )
     one = SimpleNamespace(people={}, model=MODEL, camera=camera(), video=None)
-    assert scene.stays(one) is expected
+    assert clip_background.stays(one) is expected
 
 
 def test_one_frame_without_a_shape_is_no_objection(monkeypatch):

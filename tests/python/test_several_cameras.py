@@ -22,7 +22,7 @@ from gait.io.video import Frame
 from gait.simulate.clip import simulate
 from gait.simulate.scenario import PRESETS
 from gait.simulate.stage import set_stage
-from gait.track import scene
+from gait.track import clip, clip_keypoints, read_scene
 from gait.track.clip import ClipOptions
 from gait.track.further_cameras import SeveralVideos, with_further_cameras
 from gait.track.person_keypoints import PersonKeypoints
@@ -117,17 +117,17 @@ def test_the_offset_is_from_more_frames_than_are_tracked(stage, tmp_path, monkey
         found = keypoints(stage, cameras[str(options.video)], range(90))
         return {4: found.part(slice(frames.start, frames.stop))}, 4
 
-    monkeypatch.setattr(scene, "_detect", detected)
-    monkeypatch.setattr(scene, "_require_detector", lambda options: None)
-    monkeypatch.setattr(scene, "detects", lambda options: True)
+    monkeypatch.setattr(clip_keypoints, "_detect", detected)
+    monkeypatch.setattr(read_scene, "require_detector", lambda options: None)
+    monkeypatch.setattr(read_scene, "detects", lambda options: True)
     options = ClipOptions("a.mp4", "a.mp4.json", "t.csv", background="none", stabilize="off", quiet=True)
     options = replace(options, further=(("b.mp4", "b.mp4.json"),))
     for start, stop in ((0, 20), (75, 90)):
         few = replace(options, start=start, stop=stop)
-        alone = scene.Scene.read(few)
+        alone = read_scene.read_scene(few)
         assert alone.people[4].frame.tolist() == list(range(start, stop))
         assert with_further_cameras(few, alone).began[0].startswith("began together with the first film")
-        given = scene.Scene.read(replace(few, offsets=(0.0,)))
+        given = read_scene.read_scene(replace(few, offsets=(0.0,)))
         assert len(given.longer[4].frame) == stop - start  # more would take time for nothing
 
 
@@ -349,7 +349,7 @@ def test_one_film_has_one_camera_and_is_given_once(command, tmp_path, monkeypatc
 
 def test_cameras_at_one_place_are_refused_before_long_work(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(scene.Scene, "read", None)
+    monkeypatch.setattr(clip, "read_scene", None)
     simulate(replace(SCENARIO, frames=8), ".")
     words = ["track", "video.mp4", "video_2.mp4", "--camera", "camera.json", "--camera", "camera.json"]
     assert main([*words, "--init", "init.json", "--detector", "none", "-o", "t.csv"]) == 1
@@ -406,9 +406,9 @@ def test_joints_are_measured_as_well_before_a_film_ends(smooth, tmp_path, monkey
         ones = np.ones(uv.shape[:2])
         return {0: Keypoints(np.array(frames), np.array(frames) / FPS, names, uv, ones)}, 0
 
-    monkeypatch.setattr(scene, "_detect", detected)
-    monkeypatch.setattr(scene, "_require_detector", lambda options: None)
-    monkeypatch.setattr(scene, "detects", lambda options: True)
+    monkeypatch.setattr(clip_keypoints, "_detect", detected)
+    monkeypatch.setattr(read_scene, "require_detector", lambda options: None)
+    monkeypatch.setattr(read_scene, "detects", lambda options: True)
     errors = {}
     for film in ("video_2.mp4", "short.mp4"):
         words = ["track", "video.mp4", film, "--camera", "camera.json", "--camera", "camera_2.json", *smooth]

@@ -19,9 +19,11 @@ from gait.io.video import VideoWriter, sample_frames
 from gait.lift import detected
 from gait.studio.source import require_still
 from gait.track.camera_motion import View
+from gait.track.clip_background import stays
+from gait.track.clip_camera import motion_remedy
 from gait.track.moving_video import MovingVideo, map_pixels, panorama_of
 from gait.track.options import ClipOptions
-from gait.track.scene import Scene, motion_remedy, stays
+from gait.track.read_scene import read_scene
 from gait.track.stabilise import expected_lens, find_motion, find_travel, moves, turn_in_samples
 
 CAMERA = Camera.looking((0.0, -6.0, 1.5), (0.0, 0.0, 1.0), (320, 240), 270.0)
@@ -161,15 +163,15 @@ def test_the_reported_motion_is_that_in_the_frames_to_track(tmp_path, capsys):
 
 def test_a_path_that_was_to_be_estimated_and_was_not_is_not_written(tmp_path, monkeypatch):
     """By default such a camera counts as still, and the file has that camera."""
-    monkeypatch.setattr("gait.track.scene.find_travel", lambda *_: {})
-    monkeypatch.setattr("gait.track.scene.find_turns", lambda *_, first: None)
+    monkeypatch.setattr("gait.track.clip_camera.find_travel", lambda *_: {})
+    monkeypatch.setattr("gait.track.clip_camera.find_turns", lambda *_, first: None)
     _, cameras = travelling(tmp_path / "v.mp4", 0.8, 0.2)
     write_camera(tmp_path / "camera.json", cameras[0])
     names = (str(tmp_path / name) for name in ("v.mp4", "camera.json", "t.csv"))
     options = ClipOptions(*names, detector="none", stabilize="auto", cameras_out=str(tmp_path / "p.csv"))
     with pytest.raises(UserError, match="p.csv: not written, as the camera .* is not estimated"):
-        Scene.read(options)
-    assert Scene.read(replace(options, stabilize="pans")).moved
+        read_scene(options)
+    assert read_scene(replace(options, stabilize="pans")).moved
 
 
 def test_cameras_of_a_pan_that_is_not_estimated_are_not_written(tmp_path):
@@ -178,7 +180,7 @@ def test_cameras_of_a_pan_that_is_not_estimated_are_not_written(tmp_path):
     names = (str(tmp_path / name) for name in ("v.mp4", "camera.json", "t.csv"))
     options = ClipOptions(*names, detector="none", stabilize="off", background="none")
     with pytest.raises(UserError, match="p.csv: not written, .* --stabilize auto estimates its motion"):
-        Scene.read(replace(options, cameras_out=str(tmp_path / "p.csv")))
+        read_scene(replace(options, cameras_out=str(tmp_path / "p.csv")))
 
 
 def test_a_person_followed_by_a_camera_with_given_poses_does_not_stay(tmp_path):
@@ -202,7 +204,7 @@ def test_a_person_followed_by_a_camera_with_given_poses_does_not_stay(tmp_path):
             tmp_path / "k.csv",
             Keypoints(np.arange(count), video.times, MODEL.joint_names, np.array(uv), known),
         )
-        read = Scene.read(
+        read = read_scene(
             ClipOptions(
                 *(str(tmp_path / name) for name in ("v.mp4", "camera.json", "t.csv")),
                 camera_path=str(tmp_path / "poses.csv"),
@@ -250,7 +252,7 @@ def test_by_default_a_camera_that_turns_far_is_stabilised_and_one_that_shakes_is
     film(tmp_path / "v.mp4", views(pan, shake))
     write_camera(tmp_path / "camera.json", CAMERA)
     names = (str(tmp_path / name) for name in ("v.mp4", "camera.json", "t.csv"))
-    read = Scene.read(ClipOptions(*names, detector="none", background=background))
+    read = read_scene(ClipOptions(*names, detector="none", background=background))
     err = capsys.readouterr().err
     assert (read.motion is not None) == bool(read.poses) == bool(pan)
     assert ("turned by up to" in err and "to frame 0" in err) == bool(pan)

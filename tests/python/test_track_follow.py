@@ -16,7 +16,7 @@ from gait.cli import main
 from gait.io import blob, keypoints_file, video
 from gait.io.track_file import read_track
 from gait.io.video import Frame
-from gait.track import scene
+from gait.track import clip_keypoints
 from gait.track.follow import Follower
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
@@ -125,7 +125,7 @@ def test_a_person_who_comes_back_is_found_by_keypoints(ids, at, folder, capsys, 
             )
             for id, part in ((1, slice(0, again)), (2, slice(again, count)))
         }
-        monkeypatch.setattr(scene, "_detect", lambda *_: (people, 1 if at == 0 else 2))
+        monkeypatch.setattr(clip_keypoints, "_detect", lambda *_: (people, 1 if at == 0 else 2))
         assert track(folder) == 0
     rows, mine, order = errors(folder)
     assert rows.frame.tolist() == frame.tolist()
@@ -200,7 +200,7 @@ def test_a_mirror_image_with_keypoints_loses_against_the_person(folder, monkeypa
         id: keypoints_file.Keypoints(frame, frame / 30, MODEL.joint_names, uv, np.ones(uv.shape[:2]))
         for id, uv in ((1, image), (2, real))
     }
-    monkeypatch.setattr(scene, "_detect", lambda *_: (people, 1))
+    monkeypatch.setattr(clip_keypoints, "_detect", lambda *_: (people, 1))
     assert track(folder, "--init", "auto") == 0
     rows, mine, order = errors(folder)
     assert rows.frame.tolist() == frame.tolist() and "lost" not in rows.status

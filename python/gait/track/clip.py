@@ -18,17 +18,20 @@ from gait.io.trc import write_trc
 from gait.io.video import Frame
 from gait.progress import note, progress, warning
 from gait.track.box_start import BoxStart
+from gait.track.clip_background import stays
+from gait.track.clip_keypoints import finds_shapes
 from gait.track.clip_output import write
+from gait.track.first_state import first_state, start_in_keypoints
 from gait.track.follow import Follower
 from gait.track.further_cameras import require_cameras, with_further_cameras
-from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import KEYPOINTS_SD, ClipOptions
 from gait.track.own_body import FirstPass, own_model
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
 from gait.track.plausible import Plausibility
+from gait.track.read_scene import read_scene
 from gait.track.run_report import RunReport
-from gait.track.scene import Scene, finds_shapes, first_state, stays
+from gait.track.scene import Scene
 from gait.track.setup import setup
 from gait.track.standing import Sink
 from gait.track.tracker import Tracker
@@ -52,7 +55,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
         If a file cannot be read, no person can be found to start with, or no frame can be tracked.
     """
     require_cameras(options)
-    scene = with_further_cameras(options, Scene.read(options))
+    scene = with_further_cameras(options, read_scene(options))
     if options.own_body:
         scene = _with_own_body(options, scene)
     return track_scene(options, scene, first_state(options, scene))
@@ -174,18 +177,7 @@ def _find_again(
 ) -> Start | None:
     """Find the person by their keypoints or, if these show no walk, by those of an id that may be theirs."""
     for ids in keypoints.ids, scene.others():
-        found = {
-            id: find_keypoint_start(
-                scene.people[id],
-                scene.camera,
-                scene.model,
-                first=first,
-                stop=stop,
-                height=stature,
-                poses=scene.poses,
-            )
-            for id in ids
-        }
+        found = {id: start_in_keypoints(scene, id, first, stop, stature) for id in ids}
         walks = {
             id: start
             for id, start in found.items()

@@ -13,8 +13,10 @@ from gait.camera.synchronise import Film, no_shared_frame, require_apart, synchr
 from gait.errors import UserError
 from gait.io.video import Frame, Video
 from gait.progress import note
+from gait.track.clip_background import require_scene, stays
 from gait.track.options import ClipOptions
-from gait.track.scene import Scene, require_scene, stays
+from gait.track.read_scene import read_scene
+from gait.track.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -117,7 +119,7 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
             offsets=None,
             stabilize="off",
         )
-        one = Scene.read(own, starts=False)
+        one = read_scene(own, starts=False)
         if one.video.count < 2:
             raise UserError(f"{video}: has one frame; give a film of the walk")
         require_scene(options, one, 0)

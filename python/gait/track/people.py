@@ -29,10 +29,12 @@ from gait.report.drawing import Overlay
 from gait.report.film import Films, PageFilm
 from gait.report.people_page import Person, people_page
 from gait.track.clip import track_scene
+from gait.track.clip_background import require_scene
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import ClipOptions
 from gait.track.other_people import Outline, with_track
-from gait.track.scene import Scene, require_scene
+from gait.track.read_scene import read_scene
+from gait.track.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -53,7 +55,7 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
         If a file cannot be read, or no one walks.
     """
     assert options.people is not None
-    scene = Scene.read(options)
+    scene = read_scene(options)
     require_scene(options, scene, scene.frames.start)
     starts = _starts(options, scene)
     found: dict[int, Estimates] = {}

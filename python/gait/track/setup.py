@@ -9,8 +9,11 @@ from gait.bindings.initial import Start
 from gait.camera.path import one_place
 from gait.io.video import EMPTY_SCENE_FRAMES
 from gait.report.camera_facts import camera_facts
+from gait.track.clip_camera import motion_remedy
+from gait.track.clip_keypoints import detects
+from gait.track.first_state import start_words
 from gait.track.options import ClipOptions
-from gait.track.scene import Scene, detects, motion_remedy, start_words
+from gait.track.scene import Scene
 from gait.track.stabilise import CameraTurns
 
 _BESIDE = {"init": "init.json", "camera": "camera.json"}
