@@ -90,10 +90,8 @@ def test_a_start_takes_the_person_who_walks(crossing):
     options = ClipOptions("v.mp4", "camera.json", "t.csv")
 
     def chosen(people):
-        seen = {"people": people, "person": main_person(people), "poses": {}}
-        return who_starts(
-            options, SimpleNamespace(camera=camera(), model=MODEL, frames=range(FRAMES), **seen)
-        )
+        place = {"camera": camera(), "model": MODEL, "frames": range(FRAMES), "poses": {}}
+        return who_starts(options, SimpleNamespace(people=people, person=main_person(people), **place))
 
     assert chosen({1: walks, 2: stands}) == 1
     assert chosen({2: stands}) == 2
