@@ -31,7 +31,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import lcm_rig as rig
 import numpy as np
 import table
-from facts import facts
 
 from gait.lcm.link import private_url
 from gait.lcm.messages import image_message, tracks_message
@@ -102,16 +101,12 @@ def main() -> int:
     most = max(row[5] for row in rows)
     verdict = "reached" if most < WANTED_MS else f"missed: {most:.0f} at most"
     note = (
-        f"{facts()}\n\n"
         f"SIGKILL at random moments of a stream of {RATE:.0f} frames a second; snapshots every "
         f"{PERIOD_S:.0f} s in {MEMORY}, {rig.PARTICLES} particles, 160 x 120. Milliseconds from the SIGKILL "
         f"to the next daemon's first estimate of everyone, target: below {WANTED_MS:.0f} ({verdict}); "
         "frames sent in between are lost."
     )
-    if args.record:
-        table.publish("daemon_kills", title, head, rows, note)
-    else:
-        table.show(title, head, rows)
+    table.publish("daemon_kills", title, head, rows, note, record=args.record)
     return int(any(row[2] < args.kills for row in rows))
 
 

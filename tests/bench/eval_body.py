@@ -20,7 +20,6 @@ from pathlib import Path
 import eval_clips
 import numpy as np
 import table
-from facts import facts
 from numpy.typing import NDArray
 
 from gait.bindings.model import Model, read_cyclic
@@ -76,12 +75,7 @@ def main() -> int:
                 rows.append(row)
                 update(len(rows))
     note, missed = words(rows, [case.name for case in cases if case.folder.parent != FOLDER])
-    if args.record:
-        title = "People whose limbs were measured"
-        table.publish("body", title, HEAD, rows, f"{facts()}\n\n{note}")
-    else:
-        table.show("People whose limbs were measured", HEAD, rows)
-        print(note)
+    table.publish("body", "People whose limbs were measured", HEAD, rows, note, record=args.record)
     return int(missed)
 
 

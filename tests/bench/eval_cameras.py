@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 import table
-from facts import facts
 
 from gait.bindings.model import read_cyclic
 from gait.io.track_file import read_estimates, read_truth
@@ -63,7 +62,6 @@ def main() -> int:
     middle = float(np.median(toward))
     missed = middle > WANTED
     note = (
-        f"{facts()}\n\n"
         f"Simulated walks of {args.frames} frames, seeds {args.seeds}, with the detector and all "
         "defaults, with one camera and with two. The second camera stands 60 degrees around the path. "
         f"Its film begins with the first one (two) or {args.late:g} s later (cut); this offset is found "
@@ -71,13 +69,8 @@ def main() -> int:
         "aligned. inside: coordinates within their 90 % intervals. Towards the camera, two cameras: "
         f"median of clips {middle:.0f} mm, target at most {WANTED:.0f}{', missed' if missed else ''}."
     )
-    (table.publish if args.record else _show)("cameras", "One camera and two", head, rows, note)
+    table.publish("cameras", "One camera and two", head, rows, note, record=args.record)
     return int(missed)
-
-
-def _show(name: str, title: str, head: list[str], rows: list[list[object]], note: str) -> None:
-    table.show(title, head, rows)
-    print(note)
 
 
 def made(view: str, seed: int, frames: int, late: float = 0.5, body: str = "table") -> tuple[Path, float]:

@@ -33,7 +33,6 @@ import gait_cases
 import numpy as np
 import table
 from eval_plan import Arm, Clip, Job
-from facts import facts
 
 from gait import Camera, Model, Start, Tracker, TrackerConfig, Video
 from gait.bindings.abi import TrackStatus
@@ -148,12 +147,8 @@ def main() -> None:
     rows, notes = list(_rows(runs)), [_time_of_classes(clips)]
     if not args.only and not eval_clips.absent():
         notes.append(_outdoor(args.seeds))
-    if args.record:
-        command = facts()
-        table.publish("eval_classes", TITLE, COLUMNS, rows, "\n\n".join([command, _READING, *notes]))
-    else:
-        table.show(TITLE, COLUMNS, rows)
-        print("\n\n".join(notes))
+    note = "\n\n".join([_READING, *notes])
+    table.publish("eval_classes", TITLE, COLUMNS, rows, note, record=args.record)
 
 
 def _clips(only: list[str] | None) -> list[Clip]:

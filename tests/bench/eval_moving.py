@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import table
-from facts import facts
 from scipy.spatial.transform import Rotation
 
 from gait.bindings.model import read_cyclic
@@ -84,7 +83,6 @@ def main() -> int:
     head = ["camera", "poses", "root mm", "from-to", "to still", "wanted", "abs mm", "lost"]
     title = "Cameras that move"
     note = (
-        f"{facts()}\n\n"
         f"Simulated walks of {args.frames} frames, seeds {args.seeds}, {SIZE[0]} x {SIZE[1]}, from an "
         "init file, without a detector. root, abs: medians over clips of the median over frames; from-to: "
         "range of root over clips. to still: relative to a still camera with that view. noisy: errors of "
@@ -92,12 +90,8 @@ def main() -> int:
         "not given: without standard deviations in the file. follow: the camera is on a robot 1 m "
         f"behind. lost: frames with the status lost. Missed: {', '.join(missed) or 'none'}."
     )
-    (table.publish if args.record else _show)("moving", title, head, rows, note)
+    table.publish("moving", title, head, rows, note, record=args.record)
     return int(bool(missed))
-
-
-def _show(name: str, title: str, head: list[str], rows: list[list[object]], note: str) -> None:
-    table.show(title, head, rows)
 
 
 def made(scenario: Scenario, name: str) -> Path:

@@ -24,7 +24,6 @@ import eval_cameras
 import eval_clips
 import numpy as np
 import table
-from facts import facts
 
 from gait.bindings.config import TrackerConfig
 from gait.bindings.model import read_cyclic
@@ -79,13 +78,8 @@ def main() -> int:
         for case, arms in found.items()
     ]
     note, missed = words(found)
-    if args.record:
-        alone = list(args.groups) == [DEVELOPMENT]
-        page = f"own_body_{DEVELOPMENT}" if alone else "own_body"
-        table.publish(page, TITLE, HEAD, rows, f"{facts()}\n\n{note}")
-    else:
-        table.show(TITLE, HEAD, rows)
-        print(note)
+    page = f"own_body_{DEVELOPMENT}" if list(args.groups) == [DEVELOPMENT] else "own_body"
+    table.publish(page, TITLE, HEAD, rows, note, record=args.record)
     return int(missed)
 
 

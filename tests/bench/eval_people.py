@@ -21,7 +21,6 @@ from pathlib import Path
 
 import numpy as np
 import table
-from facts import facts
 
 from gait.bindings.model import read_cyclic
 from gait.camera.camera import write_camera
@@ -73,7 +72,6 @@ def main() -> int:
     within = sum(ratio <= WANTED[0] for ratio in ratios)
     missed = within < len(ratios) or kept < WANTED[1] * crossings or strays > 0 or cost > COST
     note = (
-        f"{facts()}\n\n"
         f"Simulated clips of {args.frames} frames, {FPS:.0f} per second, seeds {args.seeds}, {SIZE[0]} x "
         f"{SIZE[1]}; camera and background given, detector `full`. Errors are medians over frames of the "
         "root error of a person's track, mm: with all people together, and alone in the same scene. "
@@ -88,11 +86,7 @@ def main() -> int:
         f"{max(costs):.2f} (target: at most {COST})."
     )
     head = ["clip", "seed", "person", "together", "alone", "ratio", "lost", "switched", "false"]
-    if args.record:
-        table.publish("people", "Several people in one clip", head, rows, note)
-    else:
-        table.show("Several people in one clip", head, rows)
-        print(note)
+    table.publish("people", "Several people in one clip", head, rows, note, record=args.record)
     return int(missed)
 
 

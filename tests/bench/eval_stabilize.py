@@ -15,14 +15,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import table
 from eval_real import OUT, Result, run
-from facts import facts
 from real_clip import Clip, errors_in_space, from_truth, read_cameras, read_clips, score
 
 from gait import Camera, Video
@@ -69,7 +68,7 @@ def main() -> int:
     parser.add_argument("--record", action="store_true")
     args = parser.parse_args()
     clips = read_clips(ROOT.parent / "shared/data/real", args.only)
-    publish = table.publish if args.record else _show
+    publish = partial(table.publish, record=args.record)
     if args.turns:
         head = [
             "clip",
@@ -79,8 +78,8 @@ def main() -> int:
             "most %",
             f"over {100 * GOOD:g} % of it %",
         ]
-        note = f"{facts()}\n\n{_TURNS}"
-        publish("eval_stabilize_turns", "Turns of the cameras of real films", head, map(_turns, clips), note)
+        turns = map(_turns, clips)
+        publish("eval_stabilize_turns", "Turns of the cameras of real films", head, turns, _TURNS)
         return 0
     clips += [
         from_truth(_made(*names)) for names in SIMULATED if not args.only or "_".join(names) in args.only
@@ -95,13 +94,8 @@ def main() -> int:
         rows.append(["mean", *kind, *np.nanmean(np.array(same, float), axis=0).tolist(), ""])
     head = ["clip", "camera", "stabilised", "good %", "one camera, good %", "tracking", "wrong",
             "error % of height", "stride rate %", "root mm", "abs mm", "CPU s", "failed"]  # fmt: skip
-    note = f"{facts()}\n\n{_READING}"
-    publish("eval_stabilize", "Stabilising", head, rows, note)
+    publish("eval_stabilize", "Stabilising", head, rows, _READING)
     return 0
-
-
-def _show(name: str, title: str, head: list[str], rows: Iterable[list[object]], note: str) -> None:
-    table.show(title, head, rows)
 
 
 def _turns(clip: Clip) -> list[object]:

@@ -21,7 +21,6 @@ import eval_clips
 import numpy as np
 import table
 from eval_real import OUT, run
-from facts import facts
 from real_clip import Clip, errors_in_space, errors_of_rows, from_truth
 
 from gait.io.track_file import Track, read_estimates, read_truth
@@ -69,16 +68,12 @@ def main() -> int:
             update(done)
     head = ["clip", *(f"{status} %" for status in STATUSES), "good %", "swap %", "off %", "wrong %",
             "far %", "root mm", "abs mm", "heading deg", "stride rate %", "failed"]  # fmt: skip
-    note = f"{facts()}\n\n{_READING}"
     page, title = "eval_status", "Status of unusual walks"
     if args.model != "walk":
         page, title = f"{page}_{Path(args.model).stem}", f"{title}, tracked with -m {args.model}"
     if args.smooth:
         page, title = f"{page}_smooth", f"{title}, smoothed"
-    if args.record:
-        table.publish(page, title, head, rows, note)
-    else:
-        table.show(title, head, rows)
+    table.publish(page, title, head, rows, _READING, record=args.record)
     return 0
 
 

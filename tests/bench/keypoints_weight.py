@@ -20,7 +20,6 @@ from unittest.mock import patch
 import eval_clips
 import numpy as np
 import table
-from facts import facts
 from real_clip import Clip, errors_in_space, from_truth, read_clips, score
 
 from gait.bindings.config import TrackerConfig
@@ -71,11 +70,8 @@ def main() -> int:
     head = ["clip", "film", "weight", "root mm", "abs mm", "good %", "wrong", "strikes: frames off",
             "stride rate %"]  # fmt: skip
     default = TrackerConfig.default().keypoints_weight
-    note = f"{facts()}\n\n{_READING.format(default=default)}"
-    if args.record:
-        table.publish("keypoints_weight", "Weight of the keypoint term", head, rows, note)
-    else:
-        table.show("Weight of the keypoint term", head, rows)
+    note = _READING.format(default=default)
+    table.publish("keypoints_weight", "Weight of the keypoint term", head, rows, note, record=args.record)
     return 0
 
 

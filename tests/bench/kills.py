@@ -25,7 +25,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import table
-from facts import facts
 
 from gait.bindings.config import TrackerConfig
 from gait.bindings.model import Model
@@ -129,14 +128,11 @@ def main() -> int:
     head = ["file", "kills", "reported as written", "files that lost some", "kills amid a write"]
     title = "Writers that are killed"
     note = (
-        f"{facts()}\n\nSIGKILL at random moments, up to "
+        f"SIGKILL at random moments, up to "
         f"{1e3 * LONGEST:.0f} ms after the first report, of a process that writes a file again and again, "
         "each time with one entry more."
     )
-    if args.record:
-        table.publish("kills", title, head, rows, note)
-    else:
-        table.show(title, head, rows)
+    table.publish("kills", title, head, rows, note, record=args.record)
     return int(any(row[3] for row in rows))
 
 

@@ -21,7 +21,6 @@ from typing import Any
 
 import eval_clips
 import table
-from facts import facts
 
 GAIT = [sys.executable, "-m", "gait"]
 
@@ -40,15 +39,11 @@ def main() -> int:
     rows = [_row(clip) for clip in clips]
     head = ["clip", "frames", "tracking ms", "drawing ms", "share"]
     note = (
-        f"{facts()}\n\n"
         "Milliseconds of processor time per frame: of the command without an overlay (decoding, "
         "tracking, its start), and what `--overlay` adds (drawing and encoding). Share: the addition "
         "relative to the former. Target: drawing takes no more than tracking."
     )
-    if args.record:
-        table.publish("overlay", "Drawing beside tracking", head, rows, note)
-    else:
-        table.show("Drawing beside tracking", head, rows)
+    table.publish("overlay", "Drawing beside tracking", head, rows, note, record=args.record)
     return int(any(row[3] > row[2] for row in rows))
 
 

@@ -16,6 +16,7 @@ import json
 import sys
 import tempfile
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,7 @@ def main() -> int:
         for f in footage:
             found.append(climbed(f, paths, args.seeds, args.rung_seeds))
             update(len(found) * len(ladder.RUNGS))
-    write = table.publish if args.record else lambda name, *rest, note="": table.show(*rest)
+    write = partial(table.publish, record=args.record)
     rows = [paper_row(each) for each in found]
     write("paper_mode", "Paper mode at its best", COLUMNS, rows, note=about(args.seeds, found))
     known = [each for each in found if each.footage.scene is not None]

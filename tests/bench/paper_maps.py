@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,7 @@ def main() -> int:
             if args.draw:
                 draw(probe, args.folder / f"map_{f.clip.name}.png")
             update(k + 1)
-    write = table.publish if args.record else lambda name, *rest, note="": table.show(*rest)
+    write = partial(table.publish, record=args.record)
     columns = ("clip", "view", "the body is", "walks, nats", "rests, nats")
     terms = [
         [name, *(f"{x:+.1f}" for f in found for x in (f.walks.terms[name], f.rests.terms[name]))]

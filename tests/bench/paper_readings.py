@@ -113,9 +113,9 @@ def main() -> int:
             judged.append(Judged.of(search, sigmas[best], range(fresh, fresh + args.seeds)))
             rows.append([equation, words, best, *judged[-1].row(judged[0])])
             update(k + 1)
-    write = table.publish if args.record else lambda name, *rest, note="": table.show(*rest)
     columns = ("eq.", "reading", "sigma", "score", *MORE, "root / free", "left", "lost", *search_paper.CLIPS)
-    write("paper_readings", "Readings of the paper's equations", columns, rows, note=about(args.seeds))
+    title = "Readings of the paper's equations"
+    table.publish("paper_readings", title, columns, rows, about(args.seeds), record=args.record)
     return 0
 
 

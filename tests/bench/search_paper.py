@@ -240,9 +240,9 @@ def lost(search: Search, record: bool) -> None:
 How many of the runs that leave the person, and of those that stay on it, are reported as lost in some
 frame, by stayed_nats; on the clips of [search_paper](search_paper.md), {len(MORE)} seeds each.  The value
 chosen has the largest difference of the two shares: {best:g}."""
-    write = table.publish if record else lambda name, *rest, note="": table.show(*rest)
     columns = ("stayed_nats", "lost of those that leave", "lost of those that hold", "difference of shares")
-    write("search_paper_lost", "From when on a person counts as lost", columns, rows, note=note)
+    title = "From when on a person counts as lost"
+    table.publish("search_paper_lost", title, columns, rows, note, record=record)
 
 
 def frozen_value(name: str, value: float) -> float:

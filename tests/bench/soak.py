@@ -21,7 +21,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import lcm_rig as rig
 import numpy as np
 import table
-from facts import facts
 
 from gait.lcm.link import private_url
 from gait.lcm.messages import image_message
@@ -90,15 +89,11 @@ def main() -> int:
         f"{args.rate:g} frames a second" if args.rate else "each frame when the one before has been estimated"
     )
     note = (
-        f"{facts()}\n\n"
         f"{pace}; {rig.PARTICLES} particles, 160 x 120. Memory and open files after {SETTLED:.0%} of the "
         f"frames and at the end. Targets: at most {MOST_KB} kB more and no additional open file; 99.9 % "
         f"of the frames within {MOST_RATIO:g} times the median."
     )
-    if args.record:
-        table.publish("soak" if not args.rate else "soak_hour", title, head, [row], note)
-    else:
-        table.show(title, head, [row])
+    table.publish("soak" if not args.rate else "soak_hour", title, head, [row], note, record=args.record)
     return int(row[3] > MOST_RATIO or row[5] > row[4] + MOST_KB or row[7] > row[6])
 
 

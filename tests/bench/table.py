@@ -39,7 +39,13 @@ def show(
 
 
 def publish(
-    name: str, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]], note: str = ""
+    name: str,
+    title: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[Any]],
+    note: str = "",
+    *,
+    record: bool = True,
 ) -> None:
     """Print a table and write it to results/`name`.csv and .md, whole or not at all.
 
@@ -50,8 +56,13 @@ def publish(
     note : str
         What a reader must know to judge the numbers: data, method; paragraphs of Markdown. `facts` are added
         unless it has some.
+    record : bool
+        Otherwise the note is printed and nothing is written.
     """
     head, cells, numbers = show(title, columns, rows)
+    if not record:
+        print(note.strip())
+        return
     made = "" if " at commit " in note else facts()
     parts = [f"## {title}", made, note.strip(), markdown(head, cells, numbers)]
     RESULTS.mkdir(parents=True, exist_ok=True)
