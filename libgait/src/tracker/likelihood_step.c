@@ -99,18 +99,9 @@ static like_body evaluate(const gait_tracker *t, int32_t c, int32_t i, int32_t l
     return b;
 }
 
-/* One particle of a block in one camera.  Its samples replace those of its ancestor. */
-static void particle_in_camera(gait_tracker *t, int32_t c, int32_t i, int32_t lane, likelihood_scratch *w)
-{
-    like_patch samples[MODEL_MAX_LIMBS], *const texture = texture_of(t, i, c);
-    like_body const b = evaluate(t, c, i, lane, w, samples);
-    t->explained[i] += like_silhouette_parts(&b).explained;
-    if (texture)
-        memcpy(texture, samples, (size_t)t->like->limbs * sizeof *samples);
-}
-
-void likelihood_particles(gait_tracker *t, int32_t c, const int32_t *index, int32_t lanes,
-                          likelihood_scratch *w, float nats[BLOCK])
+/* The particles of a block in one camera.  kept: their samples replace those of their ancestors. */
+static void particles_in_camera(gait_tracker *t, int32_t c, const int32_t *index, int32_t lanes, bool kept,
+                                likelihood_scratch *w, float nats[BLOCK])
 {
     like_patch samples[MODEL_MAX_LIMBS];
     alignment a;
@@ -118,9 +109,17 @@ void likelihood_particles(gait_tracker *t, int32_t c, const int32_t *index, int3
     if (aligned)
         displace(t, &a, w);
     likelihood_outline(t, c, w);
-    memset(&w->terms, 0, sizeof w->terms);
-    for (int32_t lane = 0; lane < lanes; lane++)
-        (void)evaluate(t, c, index[lane], lane, w, samples);
+    if (lanes < BLOCK) /* empty lanes are summed too: their sums are not used but must be defined */
+        memset(&w->terms, 0, sizeof w->terms);
+    for (int32_t lane = 0; lane < lanes; lane++) {
+        int32_t const i = index[lane];
+        like_body const b = evaluate(t, c, i, lane, w, samples);
+        if (!kept)
+            continue;
+        t->explained[i] += like_silhouette_parts(&b).explained;
+        if (texture_of(t, i, c))
+            memcpy(texture_of(t, i, c), samples, (size_t)t->like->limbs * sizeof *samples);
+    }
     like_sum(t->like, w->outline, t->core->sampled_cameras >> c & 1u, &w->terms, nats);
     if (aligned)
         put_back(t, w);
@@ -128,23 +127,20 @@ void likelihood_particles(gait_tracker *t, int32_t c, const int32_t *index, int3
         nats[lane] += a.nats[lane];
 }
 
+void likelihood_particles(gait_tracker *t, int32_t c, const int32_t *index, int32_t lanes,
+                          likelihood_scratch *w, float nats[BLOCK])
+{
+    particles_in_camera(t, c, index, lanes, false, w, nats);
+}
+
 static void block_in_camera(gait_tracker *t, int32_t c, int32_t begin, int32_t lanes, likelihood_scratch *w)
 {
     float nats[BLOCK];
-    alignment a;
-    bool const aligned = align(t, c, w, &a);
-    if (aligned)
-        displace(t, &a, w);
-    likelihood_outline(t, c, w);
-    if (lanes < BLOCK) /* empty lanes are summed too: their sums are not used but must be defined */
-        memset(&w->terms, 0, sizeof w->terms);
+    int32_t index[BLOCK];
     for (int32_t lane = 0; lane < lanes; lane++)
-        particle_in_camera(t, c, begin + lane, lane, w);
-    like_sum(t->like, w->outline, t->core->sampled_cameras >> c & 1u, &w->terms, nats);
-    if (aligned)
-        put_back(t, w);
+        index[lane] = begin + lane;
+    particles_in_camera(t, c, index, lanes, true, w, nats);
     for (int32_t lane = 0; lane < lanes; lane++) {
-        nats[lane] += aligned ? a.nats[lane] : 0.0f;
         t->loglik_raw[begin + lane] += nats[lane];
         if (t->core->hypotheses.stage == HYPOTHESES_TWO)
             t->loglik_without_silhouette[begin + lane] += nats[lane] - w->terms.nats[LIKE_SILHOUETTE][lane];
