@@ -117,52 +117,35 @@ static inline void simd16_lookup(const void *table, const int32_t *index, const 
 #if defined(__AVX512BW__)
 #define SIMD16_WORDS 16 /* words in a register */
 typedef __m512i simd16_words;
-static inline simd16_words words_load(const int32_t *v)
-{
-    return _mm512_loadu_si512(v);
-}
-
-static inline void words_store(int32_t *v, simd16_words w)
-{
-    _mm512_storeu_si512(v, w);
-}
-#define WORDS_OP(op) _mm512_##op
-#define WORDS_AND    _mm512_and_si512
+#define WORDS_OP(op)   _mm512_##op
+#define WORDS_BITS(op) _mm512_##op##_si512
 #elif defined(__AVX2__)
-#define SIMD16_WORDS 8
+#define SIMD16_WORDS   8
 typedef __m256i simd16_words;
-static inline simd16_words words_load(const int32_t *v)
-{
-    return _mm256_loadu_si256((const __m256i_u *)v);
-}
-
-static inline void words_store(int32_t *v, simd16_words w)
-{
-    _mm256_storeu_si256((__m256i_u *)v, w);
-}
-#define WORDS_OP(op) _mm256_##op
-#define WORDS_AND    _mm256_and_si256
+#define WORDS_OP(op)   _mm256_##op
+#define WORDS_BITS(op) _mm256_##op##_si256
 #elif defined(SIMD16_SSE2)
-#define SIMD16_WORDS 4
+#define SIMD16_WORDS   4
 typedef __m128i simd16_words;
-static inline simd16_words words_load(const int32_t *v)
-{
-    return _mm_loadu_si128((const __m128i_u *)v);
-}
-
-static inline void words_store(int32_t *v, simd16_words w)
-{
-    _mm_storeu_si128((__m128i_u *)v, w);
-}
-#define WORDS_OP(op) _mm_##op
-#define WORDS_AND    _mm_and_si128
+#define WORDS_OP(op)   _mm_##op
+#define WORDS_BITS(op) _mm_##op##_si128
 #endif
 
 #if defined(SIMD16_WORDS)
+static inline simd16_words words_load(const int32_t *v)
+{
+    return WORDS_BITS(loadu)((const void *)v);
+}
+
+static inline void words_store(int32_t *v, simd16_words w)
+{
+    WORDS_BITS(storeu)((void *)v, w);
+}
+
 /* For each word, 256 - fraction in the low half and the fraction (low byte) in the high half. */
 static inline simd16_words words_shares(simd16_words v)
 {
-    simd16_words const f = WORDS_AND(v, WORDS_OP(set1_epi32)(255));
+    simd16_words const f = WORDS_BITS (and)(v, WORDS_OP(set1_epi32)(255));
     return WORDS_OP(add_epi32)(WORDS_OP(slli_epi32)(f, 16),
                                WORDS_OP(sub_epi32)(WORDS_OP(set1_epi32)(256), f));
 }
@@ -178,8 +161,8 @@ static inline void simd16_bilinear(const int32_t *four, const int32_t *u, const 
         simd16_words const even = WORDS_OP(srai_epi16)(WORDS_OP(slli_epi16)(w, 8), 8);
         simd16_words const top = WORDS_OP(madd_epi16)(even, across);
         simd16_words const low = WORDS_OP(madd_epi16)(WORDS_OP(srai_epi16)(w, 8), across);
-        simd16_words const both =
-            WORDS_OP(add_epi32)(WORDS_OP(slli_epi32)(low, 16), WORDS_AND(top, WORDS_OP(set1_epi32)(65535)));
+        simd16_words const both = WORDS_OP(add_epi32)(WORDS_OP(slli_epi32)(low, 16),
+                                                      WORDS_BITS (and)(top, WORDS_OP(set1_epi32)(65535)));
         simd16_words const sum = WORDS_OP(madd_epi16)(both, words_shares(words_load(v + i)));
         simd16_words const up = WORDS_OP(srli_epi32)(WORDS_OP(srai_epi32)(sum, 31), 16);
         words_store(out + i, WORDS_OP(srai_epi32)(WORDS_OP(add_epi32)(sum, up), 16));
@@ -266,7 +249,7 @@ static inline simd16_sums simd16_sum_bytes(const int32_t *bytes, const int32_t *
     simd16_sums sum = {0, 0, 0};
     for (int32_t i = 0; i < count; i += SIMD16_WORDS) {
         simd16_words const w = words_load(bytes + i);
-        low = WORDS_OP(add_epi32)(low, WORDS_AND(w, WORDS_OP(set1_epi32)(255)));
+        low = WORDS_OP(add_epi32)(low, WORDS_BITS (and)(w, WORDS_OP(set1_epi32)(255)));
         dot =
             WORDS_OP(add_epi32)(dot, WORDS_OP(madd_epi16)(WORDS_OP(srai_epi16)(w, 8), words_load(pair + i)));
         taken = WORDS_OP(add_epi32)(taken, WORDS_OP(srli_epi32)(words_load(take + i), 31));
