@@ -5,6 +5,7 @@
 #include "sanitized.h"
 #include "toy_classes.h"
 #include "toy_film.h"
+#include "tracker/class_strata.h"
 #include "tracker/fit_check.h"
 #include "tracker/tracker.h"
 
@@ -251,6 +252,42 @@ static void test_stops_and_walks_on(void)
     }
 }
 
+/* Standing estimates that drift make standing less likely, for a while also after the estimate walks on. */
+static void test_drift(void)
+{
+    static uint8_t wall[SCENE_PIXELS];
+    gait_tracker_config const cfg = settings();
+    toy_wall(0, wall);
+    gait_tracker *const t = begin(&cfg, wall);
+    particle_state at = t->core->last_supported;
+    float const speed = 0.4f, step = 1.0f / 30.0f;
+    t->core->support_utime = t->core->utime;
+    class_strata_support(t, TOY_STAND, &at); /* as if in the same frame: nothing is known of the drift */
+    CHECK(t->classes->drift[0] == 0.0f && t->classes->supported == TOY_STAND);
+    for (int n = 0; n < 60; n++) {
+        bool const walks = n >= 30;
+        t->core->last_supported = at;
+        t->core->support_utime = t->core->utime;
+        t->core->utime += 33333;
+        at.f[F_X] += speed * step;
+        class_strata_support(t, walks ? TOY_WALK : TOY_STAND, &at);
+        float const drift = t->classes->drift[0];
+        CHECK(fabsf(t->classes->drift[1]) < 1e-6f);
+        if (n == 29)
+            CHECK(drift > 0.9f * speed && drift < 1.01f * speed);
+        if (n == 59)
+            CHECK(drift > 0.3f * speed && drift < 0.4f * speed);
+    }
+    t->classes->drift[0] = 0.3f;
+    t->classes->drift[1] = 0.4f;
+    for (int32_t i = 0; i < t->filter.n; i++)
+        t->loglik[i] = -1.0f;
+    class_strata_penalise_drift(t);
+    for (int32_t i = 0; i < t->filter.n; i++)
+        CHECK(fabsf(t->loglik[i] - (class_at(t, i) == TOY_STAND ? -13.5f : -1.0f)) < 1e-4f);
+    toy_tracker_free(t);
+}
+
 /* A standing person has no phase that fits as well; turned, the same body fits less. */
 static void test_fit_of_a_standing_person(void)
 {
@@ -396,7 +433,7 @@ static void test_resumes(void)
     }
 }
 
-#define GOLDEN UINT64_C(0x15230ee0febdba10)
+#define GOLDEN UINT64_C(0x25802a3e3edaa6f3)
 
 static void all(void)
 {
@@ -410,8 +447,10 @@ static void all(void)
     test_starts();
     test_one_class();
     test_fit_of_a_standing_person();
+    test_drift();
     if (!SANITIZED) {
         test_stops_and_walks_on();
+        test_drift();
         test_stops_while_hidden();
     }
     test_same_bits();

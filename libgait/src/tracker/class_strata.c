@@ -9,6 +9,9 @@ static const double MATTERS = 0.05; /* probability of a class from which its eff
 static const int64_t STILL_TIME =
     500000;                         /* microseconds of standing still after which either leg may go first */
 static const float SCORE_SD = 0.5f; /* of a person's scores in a class in which they have been seen before */
+static const float DRIFT_TIME = 0.25f;  /* seconds over which the drift of a standing estimate is averaged */
+static const float DRIFT_MEMORY = 1.0f; /* seconds for which it counts after the estimate has moved on */
+static const float DRIFT_SD = 0.1f;     /* metres per second, of people who do stand */
 
 /* ---- ranges ---- */
 /* Append ranges of n particles from `first` on, in multiples of `unit`: each class gets the minimum, and the rest is shared
@@ -178,7 +181,7 @@ void class_strata_enter(const gait_tracker *t, uint32_t counter, float dt, int32
                            .frame = counter,
                            .score = s->score[to],
                            .score_sd = s->known >> to & 1u ? SCORE_SD : 1.0f,
-                           .resumes = t->layouts[s->reported].model->direction == 0 &&
+                           .resumes = class_stands(t, s->reported) &&
                                       t->core->hypotheses.stage == HYPOTHESES_ONE && still < STILL_TIME,
                            .phase = t->core->reported_phase,
                            .seconds = in_walking_time(t, 1e-6f * (float)still) - dt};
@@ -192,6 +195,32 @@ void class_strata_enter(const gait_tracker *t, uint32_t counter, float dt, int32
         for (int32_t f = 0; f < t->particles.fields; f++)
             p->f[f][lane] = one.f[f];
     }
+}
+
+/* ---- drift ---- */
+/* Each standing particle stays where it is, but the images decide which of them last, so that together they follow a person
+ * who walks slowly. */
+void class_strata_penalise_drift(gait_tracker *t)
+{
+    const strata *const s = tracker_strata(t);
+    const float *const v = t->classes->drift;
+    float const nats = (v[0] * v[0] + v[1] * v[1]) / (2.0f * DRIFT_SD * DRIFT_SD);
+    for (int32_t k = 0; k < s->count; k++)
+        for (int32_t i = s->first[k]; class_stands(t, s->motion_class[k]) && i < s->first[k + 1]; i++)
+            t->loglik[i] -= nats;
+}
+
+void class_strata_support(gait_tracker *t, int32_t motion_class, const particle_state *mean)
+{
+    class_state *const s = t->classes;
+    float const dt = seconds_since(t, t->core->support_utime);
+    bool const stood = class_stands(t, s->supported) && class_stands(t, motion_class);
+    float const keep = m_exp(-dt / (stood ? DRIFT_TIME : DRIFT_MEMORY));
+    for (int32_t k = 0; k < 2; k++) {
+        float const way = mean->f[F_X + k] - t->core->last_supported.f[F_X + k];
+        s->drift[k] = keep * s->drift[k] + (stood && dt > 0.0f ? (1.0f - keep) * (way / dt) : 0.0f);
+    }
+    s->supported = motion_class;
 }
 
 /* ---- what is reported ---- */
@@ -233,8 +262,8 @@ void class_strata_report(gait_tracker *t, const particle_state *mean, gait_estim
     class_state *const s = t->classes;
     int64_t const age = t->core->utime - t->core->start_utime;
     int32_t const now = e->motion_class;
-    bool const still = t->layouts[now].model->direction == 0;
-    bool const was_still = t->layouts[s->reported].model->direction == 0;
+    bool const still = class_stands(t, now);
+    bool const was_still = class_stands(t, s->reported);
     if (still)
         e->mean.phase = t->core->reported_phase;
     if (was_still && age - s->moved >= STILL_TIME && t->core->hypotheses.stage != HYPOTHESES_ACQUISITION) {

@@ -32,6 +32,12 @@ void class_strata_origins(gait_tracker *t, const strata *then);
 void class_strata_enter(const gait_tracker *t, uint32_t counter, float dt, int32_t first, int32_t lanes,
                         particle_block *p);
 
+/* Lower the log-likelihoods of standing particles by the drift of standing estimates. */
+void class_strata_penalise_drift(gait_tracker *t);
+
+/* An image supports this estimate: note its class and, while it stands, its drift.  Before core.last_supported changes. */
+void class_strata_support(gait_tracker *t, int32_t motion_class, const particle_state *mean);
+
 /* Probability of each class under these weights. */
 void class_strata_probability(const strata *s, const double *weight, double out[GAIT_MAX_CLASSES]);
 

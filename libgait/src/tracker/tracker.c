@@ -295,10 +295,10 @@ static void check_estimate(gait_tracker *t, float dt, bool lost, const state_lay
     core->front_back_margin = front_back_update(t, lost || !core->found, of, mean);
     core->left_right_margin = left_right_update(t, lost || !core->found, of, mean);
     core->fit_margin = fit_check_update(t, lost || !core->found, of, mean);
+    if (t->classes)
+        class_strata_support(t, of->model->motion_class, mean);
     core->support_utime = core->utime;
     core->last_supported = *mean;
-    if (t->classes)
-        t->classes->supported = of->model->motion_class;
     core->found = proven;
 }
 
@@ -306,7 +306,7 @@ static void check_estimate(gait_tracker *t, float dt, bool lost, const state_lay
 static bool others_fit(const gait_tracker *t, const gait_estimate *e)
 {
     const tracker_core *const core = t->core;
-    bool const still = t->layouts[e->motion_class].model->direction == 0;
+    bool const still = class_stands(t, e->motion_class);
     return core->fit_margin < 0.0f || core->front_back_margin < 0.0f ||
            (!still && core->left_right_margin < 0.0f);
 }
@@ -314,7 +314,7 @@ static bool others_fit(const gait_tracker *t, const gait_estimate *e)
 static gait_track_status status_of(const gait_tracker *t, float dt, const gait_estimate *e)
 {
     const tracker_core *const core = t->core;
-    bool const still = t->layouts[e->motion_class].model->direction == 0;
+    bool const still = class_stands(t, e->motion_class);
     float const predicted = core->reported_phase + in_walking_time(t, dt) * core->reported_rate;
     bool const departs =
         !(t->classes && (e->motion_class != t->classes->reported || still)) &&
@@ -377,6 +377,8 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     likelihood_step(t); /* without an image it only computes joints */
     if (has_image)
         track_loss_bound(t);
+    if (has_image && t->classes)
+        class_strata_penalise_drift(t);
     pf_summary s = has_image ? hypotheses_update(t, dt)
                              : (pf_summary){.best = pf_heaviest(&t->filter), .ess = pf_ess(&t->filter)};
     if (t->classes)

@@ -75,6 +75,8 @@ typedef struct class_state { /* of a model with several classes (class_strata.h)
     int32_t reported, supported; /* class of the last estimate, and of core.last_supported */
     int32_t open_sides;          /* 1: the person stood still, so left and right will be split */
     uint32_t known;              /* bit c: there are scores of the person in class c */
+    float
+        drift[2]; /* of the estimates that stand, over the ground, mean of the last ones: metres per second */
     float score[GAIT_MAX_CLASSES][GAIT_MAX_COMPONENTS];
 } class_state;
 
@@ -222,6 +224,12 @@ static inline strata *tracker_strata(const gait_tracker *t)
 }
 
 int32_t stratum_at(const strata *s, int32_t particle);
+
+/* Whether people of a class stand. */
+static inline bool class_stands(const gait_tracker *t, int32_t motion_class)
+{
+    return t->layouts[motion_class].model->direction == 0;
+}
 
 /* Class of a current particle, and its layout. */
 int32_t class_at(const gait_tracker *t, int32_t particle);
