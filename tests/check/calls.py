@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""calls.py LIMIT FILE.ci...: no recursion, and no path of calls needs more than LIMIT bytes of stack.
+"""calls.py LIMIT FILE.o...: no recursion, and no path of calls needs more than LIMIT bytes of stack.
 
-The files are gcc's call graphs (-fcallgraph-info=su), read in the folder where gcc ran.  A call through a
-pointer reaches the kernels of that name or the functions in POINTERS, otherwise every function whose address
-is taken.  The stack of functions outside the graphs is not counted: that of libc and of a caller's threads.
+Beside each object is gcc's call graph, FILE.ci (-fcallgraph-info=su), read in the folder where gcc ran.  A
+call through a pointer reaches the kernels of that name or the functions in POINTERS, otherwise every function
+whose address is taken.  The stack of functions outside the graphs is not counted: that of libc and of a caller's threads.
 """
 
 import re
@@ -46,17 +46,17 @@ class Graph(NamedTuple):
     places: dict[str, set[str]]
 
 
-def read(paths: list[str]) -> Graph:
+def read(paths: list[Path]) -> Graph:
     """All graphs as one; static functions also have their object file in the title."""
     graph = Graph({}, {}, {})
     for path in paths:
-        text = Path(path).read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8")
         unit = UNIT.findall(text)[0]
         if not Path(unit).exists():  # the graph of a source that moved may have remained
             continue
 
-        def unique(title: str, path: str = path) -> str:
-            return f"{Path(path).stem}:{title.rsplit(':', 1)[1]}" if ":" in title else title
+        def unique(title: str, path: Path = path) -> str:
+            return f"{path.stem}:{title.rsplit(':', 1)[1]}" if ":" in title else title
 
         for title, file, size in NODE.findall(text):
             name = title.rsplit(":", 1)[-1].split(".")[0]
@@ -140,8 +140,11 @@ def deepest(graph: Graph) -> tuple[int, list[str]]:
 
 
 def main() -> int:
-    limit, files = int(sys.argv[1]), sys.argv[2:]
-    graph = read(files)
+    limit, graphs = int(sys.argv[1]), [Path(name).with_suffix(".ci") for name in sys.argv[2:]]
+    if absent := [path for path in graphs if not path.is_file()]:
+        print(f"no {absent[0]}: ccache may lose call graphs; remove {absent[0].parent}, CCACHE_DISABLE=1 make")
+        return 1
+    graph = read(graphs)
     if not graph.functions:
         print("no call graphs: build with gcc")
         return 1

@@ -24,7 +24,7 @@ check layers 'includes and calls go down, in no circle' python3 $here/layers.py 
 check py_layers 'imports go down, in no circle' python3 $here/py_layers.py python/LAYERS python/gait
 check stack 'frames of 16384 bytes at most' python3 $here/stack.py 16384 "$B"/src/*/*.su
 if ls "$B"/src/*/*.ci >/dev/null 2>&1; then
-    check calls "no recursion, paths of 49152 bytes at most without libc's" python3 $here/calls.py 49152 "$B"/src/*/*.ci
+    check calls "no recursion, paths of 49152 bytes at most without libc's" python3 $here/calls.py 49152 "$B"/src/*/*.o
 else
     echo 'check calls: needs the call graphs of gcc, skipped'
 fi
