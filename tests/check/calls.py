@@ -3,7 +3,8 @@
 
 Beside each object is gcc's call graph, FILE.ci (-fcallgraph-info=su), read in the folder where gcc ran.  A
 call through a pointer reaches the kernels of that name or the functions in POINTERS, otherwise every function
-whose address is taken.  The stack of functions outside the graphs is not counted: that of libc and of a caller's threads.
+whose address is taken.  The stack of functions outside the graphs is not counted: that of libc and of a
+caller's threads.
 """
 
 import re
@@ -142,7 +143,8 @@ def deepest(graph: Graph) -> tuple[int, list[str]]:
 def main() -> int:
     limit, graphs = int(sys.argv[1]), [Path(name).with_suffix(".ci") for name in sys.argv[2:]]
     if absent := [path for path in graphs if not path.is_file()]:
-        print(f"no {absent[0]}: ccache may lose call graphs; remove {absent[0].parent}, CCACHE_DISABLE=1 make")
+        where = absent[0].parent
+        print(f"no {absent[0]}: ccache may lose call graphs; remove {where} and make with CCACHE_DISABLE=1")
         return 1
     graph = read(graphs)
     if not graph.functions:
