@@ -24,7 +24,9 @@ class Stage:
     def __init__(self, monkeypatch):
         self.places = {}
         monkeypatch.setattr(
-            people, "PersonNetwork", lambda: lambda image, small: [list(map(self.crop, self.visible()))]
+            people,
+            "PersonNetwork",
+            lambda: lambda image, small: [list(map(self.crop, self.visible()))],
         )
         monkeypatch.setattr(people, "LandmarkNetwork", lambda name: self.landmarks)
         self.detector = people.PeopleDetector()
@@ -40,7 +42,11 @@ class Stage:
 
     def landmarks(self, image, crop):
         """See the person nearest to the middle of a crop."""
-        near = min(self.visible(), key=lambda place: abs(place - crop.centre[0]), default=np.inf)
+        near = min(
+            self.visible(),
+            key=lambda place: abs(place - crop.centre[0]),
+            default=np.inf,
+        )
         if abs(near - crop.centre[0]) > 60:
             return Person(0.1, np.zeros((16, 2)), np.zeros(16), crop)
         x = near + 15.0 * np.array([1, -1] * 8)
@@ -74,6 +80,31 @@ def test_people_who_cross_keep_their_ids(other, stage):
         found = stage.step(n, red=80 + 8 * n, **{other: 560 - 8 * n})
         assert found.get(1, 80 + 8 * n) == pytest.approx(80 + 8 * n, abs=31)
     assert found == {1: pytest.approx(80 + 8 * n), 2: pytest.approx(560 - 8 * n)}
+
+
+@pytest.mark.parametrize("other", ["blue", "red2"])
+def test_someone_who_comes_out_from_behind_another_is_found_at_once(stage, other):
+    """If the empty scene is known; otherwise the next search finds them."""
+    stage.detector = people.PeopleDetector(everyone=True, empty=np.zeros((200, 640, 3), np.uint8))
+    for n in range(60):
+        found = stage.step(n, red=80 + 8 * n, **{other: 560 - 8 * n})
+        apart = abs(480 - 16 * n)
+        if apart > 60:
+            assert found == {
+                1: pytest.approx(80 + 8 * n),
+                2: pytest.approx(560 - 8 * n),
+            }
+
+
+def test_people_who_overlap_from_the_first_frame_are_both_followed(stage):
+    """One overtakes the other; without the empty scene crops so near each other count as one person's."""
+    stage.detector = people.PeopleDetector(everyone=True, empty=np.zeros((200, 640, 3), np.uint8))
+    for n in range(40):
+        found = stage.step(n, red=100 + 5 * n, blue=140 + 6 * n)
+        assert sorted(found.values()) == [
+            pytest.approx(100 + 5 * n),
+            pytest.approx(140 + 6 * n),
+        ]
 
 
 def test_one_who_walks_on_behind_a_wall_has_the_old_id(stage):
@@ -165,7 +196,11 @@ def test_the_main_person_is_in_view_long_and_large():
         uv = np.zeros((frames, 16, 2))
         uv[:, 14:, 1] = height
         return Keypoints(
-            np.arange(frames), np.arange(frames) / 25, tuple(LANDMARK_JOINTS), uv, np.ones((frames, 16))
+            np.arange(frames),
+            np.arange(frames) / 25,
+            tuple(LANDMARK_JOINTS),
+            uv,
+            np.ones((frames, 16)),
         )
 
     assert people.main_person({1: keypoints(100, 50), 2: keypoints(60, 200)}) == 2
@@ -182,7 +217,8 @@ def test_tiles_cover_the_picture():
 def test_absent_weights_name_the_remedy(tmp_path, monkeypatch):
     monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
     with pytest.raises(
-        UserError, match=f"pose_detection.tflite: .* not in {tmp_path}; run gait detect --fetch"
+        UserError,
+        match=f"pose_detection.tflite: .* not in {tmp_path}; run gait detect --fetch",
     ):
         weights.load(weights.PERSON)
 
@@ -197,7 +233,8 @@ def test_damaged_weights_are_refused(tmp_path, monkeypatch):
 def test_a_folder_of_weights_that_is_none_is_refused(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path / "nowhere"))
     with pytest.raises(
-        UserError, match="GAIT_WEIGHTS: .*nowhere is not a folder; unset it, or run gait detect"
+        UserError,
+        match="GAIT_WEIGHTS: .*nowhere is not a folder; unset it, or run gait detect",
     ):
         weights.find(weights.PERSON)
 
@@ -216,7 +253,8 @@ def test_a_package_that_cannot_be_had_is_one_line(tmp_path, monkeypatch):
     failed = subprocess.CompletedProcess([], 1, "", "a\nERROR: no network\n")
     monkeypatch.setattr(subprocess, "run", lambda *args, **kwargs: failed)
     with pytest.raises(
-        UserError, match=r"mediapipe==.*cannot be downloaded \(ERROR: no network\); try again"
+        UserError,
+        match=r"mediapipe==.*cannot be downloaded \(ERROR: no network\); try again",
     ):
         weights.fetch(lambda line: None)
     assert list(tmp_path.iterdir()) == []
@@ -260,7 +298,21 @@ def test_no_person_writes_nothing(fetched, tmp_path, capsys):
 
 def test_a_simulated_walk_is_found(fetched, tmp_path, capsys):
     clip = tmp_path / "walk"
-    assert cli.main(["simulate", "-o", str(clip), "--frames", "8", "--size", "480x360", "--quiet"]) == 0
+    assert (
+        cli.main(
+            [
+                "simulate",
+                "-o",
+                str(clip),
+                "--frames",
+                "8",
+                "--size",
+                "480x360",
+                "--quiet",
+            ]
+        )
+        == 0
+    )
     out = tmp_path / "k.csv"
     capsys.readouterr()
     assert cli.main(["detect", str(clip / "video.mp4"), "-o", str(out), "--json"]) == 0
@@ -276,7 +328,10 @@ def test_people_of_a_real_film_are_found_and_placed(fetched):
     known = json.loads((clip / "init.json").read_text())
     found = people.detect(Video(clip / "video.mp4"), first=26, stop=60)
     start = find_keypoint_start(
-        found[people.main_person(found)], Camera.read(clip / "camera.json"), Model(), height=1.65
+        found[people.main_person(found)],
+        Camera.read(clip / "camera.json"),
+        Model(),
+        height=1.65,
     )
     gone = (known["frame"] - start.frame) / 30
     phase = start.mean.phase + gone * start.mean.stride_hz - known["phase"]

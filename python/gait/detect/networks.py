@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 Network = Callable[[NDArray[np.float32]], dict[str, NDArray[np.float32]]]
 
 _PERSON_SIDE, _CROP_SIDE, _HEAT_SIDE = 224, 256, 64  # inputs, pixels; heat maps, cells
+LEAST_SCORE = 0.5
+"""Least score of a person in a crop."""
 _LANDMARKS = 39  # 33 of the body, then centre and top of the person's circle, then four that are not used
 _CENTRE, _TOP = 33, 34
 _LEAST_PERSON = 0.5  # score of a box

@@ -8,6 +8,9 @@ wanted, it searches small parts too, and beside people found, but once a second 
 People who meet in the picture are distinguished by their courses and the colours of their clothes: while two
 are near each other, landmarks off a person's course belong to another person, and the person counts as
 hidden. A person who comes back gets the old id if position and colours agree.
+
+If the empty scene is known, the landmarks of people who overlap are found one by one, without the others
+(`gait.detect.overlaps`), and a person hidden by another is looked for in every frame.
 """
 
 from __future__ import annotations
@@ -22,7 +25,16 @@ from numpy.typing import NDArray
 
 from gait.counts import count_of
 from gait.detect import profile
-from gait.detect.networks import LANDMARK_JOINTS, Crop, LandmarkNetwork, Person, PersonNetwork, whole_picture
+from gait.detect.networks import (
+    LANDMARK_JOINTS,
+    LEAST_SCORE,
+    Crop,
+    LandmarkNetwork,
+    Person,
+    PersonNetwork,
+    whole_picture,
+)
+from gait.detect.overlaps import Mask, Overlaps, foot, overlap, same_joints
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
@@ -31,7 +43,6 @@ Array = NDArray[np.float64]
 Colours = NDArray[np.float32]
 """Histogram of lightness and hue of the clothes on the trunk, shape `_BINS`, sum 1."""
 
-_LEAST_SCORE = 0.5  # of a person in a crop
 _SCAN_PERIOD = 1.0  # seconds between scans of the whole picture
 _RETRY = 0.2  # the same while a person is lost or none has been found, and after one was found
 _FORGET = 60.0  # seconds after which a person who comes back gets a new id
@@ -39,6 +50,12 @@ _SAME_CROP = 0.25  # crop sides between the centres of crops around the same per
 #: Crop sides per second by which a lost person may leave their course, in addition to `_SAME_CROP`.
 _CROP_SPEED = 0.8
 _BESIDE = 0.33  # crop sides from a person to the next of a group
+_OVERLAPPING = 0.15  # the same if they overlap
+_MAY_HIDE = 0.5  # crop sides from a person within which they may hide another
+_LONGEST_HIDDEN = 2.0  # seconds for which a hidden person is looked for in every frame
+_CLEAR = 0.7  # share of a person's area that others leave in view, with which they are on their own course
+_FRONT = 0.95  # the same of a person in front of the others
+_LEAST_TRUNK = 0.3  # share of the trunk that must be in view to know its colours
 _COURSE = 0.3  # seconds from which the speed on a course is computed
 _CONTACT = 0.35  # crop sides; people closer than this may be mistaken for each other
 _LONG_CONTACT = 1.0  # seconds, after which people walk together and their courses are computed afresh
@@ -77,7 +94,7 @@ class Followed:
     count: int = 0
     """Number of frames in which the person was found, also of those left out by `forget`."""
     free: int = 0
-    """Index of the last frame in which no other person was near."""
+    """Index of the last frame in which no other person was near, or hid them."""
     lost: bool = False
 
     def expected(self, time: float) -> Crop:
@@ -94,7 +111,7 @@ class Followed:
         """Predict the crop's centre at a time from the person's course before others were near."""
         free, begin = self.free, self._course_begin()
         centre, since = self.keypoints[free].crop.centre, self.keypoints[begin].crop.centre
-        if self.times[free] - self.times[begin] < _COURSE / 2:
+        if not self.course_is_known():
             return centre
         speed = (centre - since) / (self.times[free] - self.times[begin])
         return np.asarray(centre + (time - self.times[free]) * speed)
@@ -105,6 +122,15 @@ class Followed:
         while begin > 0 and self.times[self.free] - self.times[begin - 1] <= _COURSE:
             begin -= 1
         return begin
+
+    def joints_in(self, crop: Crop) -> Array:
+        """Predict the landmarks (16, 2) in a crop: those last found, moved with it."""
+        last = self.keypoints[-1]
+        return np.asarray(last.uv + crop.centre - last.crop.centre)
+
+    def course_is_known(self) -> bool:
+        """Whether there is a speed on the course."""
+        return self.times[self.free] - self.times[self._course_begin()] >= _COURSE / 2
 
     def forget(self) -> None:
         """Leave out frames that `expected` and `on_course` do not need any more."""
@@ -134,6 +160,8 @@ class PeopleDetector:
     live : bool
         Keep only what later frames need, for a stream without end: `people` then lacks earlier frames, and
         people whose id will not come back; `keypoints` cannot be used.
+    empty : image, optional
+        The empty scene of a static camera, BGR, for finding people who overlap one by one.
 
     Attributes
     ----------
@@ -152,10 +180,12 @@ class PeopleDetector:
         most: int = _MOST_PEOPLE,
         everyone: bool = False,
         live: bool = False,
+        empty: Image | None = None,
     ) -> None:
         self._network = network
         self._find = PersonNetwork()
         self._landmarks = LandmarkNetwork(network)
+        self._overlaps = None if empty is None else Overlaps(empty, self._landmarks)
         self._most, self._everyone, self._live = most, everyone, live
         self._ids = itertools.count(1)
         self._scanned = self._scanned_for_all = -np.inf
@@ -176,21 +206,22 @@ class PeopleDetector:
             The person, with an `id`, and the detector's joints in this frame: `uv` (16, 2), pixels, and
             `confidence` (16,), in the order of the names of `keypoints`.
         """
+        if self._overlaps is not None:
+            self._overlaps.see(frame.image)
         found: list[tuple[Followed, Person]] = []
         near = {one.id: self._others_near(one, frame.time) for one in self.people if not one.lost}
-        located = [
-            (one, self._landmarks(frame.image, one.expected(frame.time)))
-            for one in self.people
-            if not one.lost
-        ]
-        for one, person in sorted(located, key=lambda pair: pair[0].off_course(frame.time, pair[1])):
-            same = any(_same(person, p) for _, p in found)  # two people at the same position are one
-            one.lost = person.score < _LEAST_SCORE or same or self._strange(one, frame, person, near[one.id])
+        located = self._located(frame)
+        for one, person, hidden in sorted(located, key=lambda at: at[0].off_course(frame.time, at[1])):
+            same = any(self._same(person, p) for _, p in found)  # two people at the same position are one
+            strange = self._strange(one, frame, person, near[one.id], hidden)
+            one.lost = person.score < LEAST_SCORE or same or strange
             if not one.lost:
-                self._add(one, frame, person, near[one.id])
+                self._add(one, frame, person, near[one.id], hidden)
                 found.append((one, person))
+        self._add_new(frame, found, self._hidden_behind(found, frame.time))
         since = frame.time - self._scanned
         missing = not found or self._searched or any(self._just_lost(p, frame.time) for p in self.people)
+        missing = missing or bool(self._hidden_behind(found, frame.time))
         if since >= (_RETRY if missing else _SCAN_PERIOD):
             self._scanned = frame.time
             self._searched = self._scan(frame, found)
@@ -221,6 +252,44 @@ class PeopleDetector:
             return people
         return {id: profile.corrected(found, self._network) for id, found in people.items()}
 
+    def _located(self, frame: Frame) -> list[tuple[Followed, Person, Mask | None]]:
+        """Find the landmarks of everyone who is followed, and where others hide them.
+
+        If the empty scene is known, the nearest people are found first.
+        """
+        followed = [one for one in self.people if not one.lost]
+        crops = {one.id: one.expected(frame.time) for one in followed}
+        if self._overlaps is None:
+            return [(one, self._landmarks(frame.image, crops[one.id]), None) for one in followed]
+        joints = {one.id: one.joints_in(crops[one.id]) for one in followed}
+        located = []
+        for one in sorted(followed, key=lambda one: foot(joints[one.id]), reverse=True):
+            beside = [
+                joints[other.id]
+                for other in followed
+                if other is not one and overlap(crops[one.id], crops[other.id])
+            ]
+            person, hidden = self._overlaps.find(crops[one.id], joints[one.id], beside)
+            if person.score >= LEAST_SCORE:
+                joints[one.id] = person.uv
+            located.append((one, person, hidden))
+        return located
+
+    def _hidden_behind(self, found: list[tuple[Followed, Person]], time: float) -> list[Crop]:
+        """Predict the crops of people hidden by those found, if the empty scene is known."""
+        if self._overlaps is None:
+            return []
+        lost = [
+            one.expected(time) for one in self.people if one.lost and time - one.times[-1] < _LONGEST_HIDDEN
+        ]
+        return [crop for crop in lost if any(_apart(crop, p.crop) < _MAY_HIDE for _, p in found)]
+
+    def _same(self, a: Person, b: Person) -> bool:
+        """Whether two sets of landmarks are of the same person; those of two who overlap differ in joints."""
+        if self._overlaps is None and _apart(a.crop, b.crop) < _SAME_CROP / 2:
+            return True
+        return same_joints(a, b)
+
     def _others_near(self, one: Followed, time: float) -> list[Followed]:
         """List other people, in view or briefly hidden, who may be mistaken for a person."""
         place = one.expected(time)
@@ -232,13 +301,17 @@ class PeopleDetector:
             and _apart(place, other.expected(time)) < _CONTACT
         ]
 
-    def _strange(self, one: Followed, frame: Frame, person: Person, near: list[Followed]) -> bool:
+    def _strange(
+        self, one: Followed, frame: Frame, person: Person, near: list[Followed], hidden: Mask | None
+    ) -> bool:
         """Whether the person found in a crop is not the one that the crop was made for."""
         contact = frame.time - one.times[one.free]
         off = one.off_course(frame.time, person) > _OFF_COURSE[0] + _OFF_COURSE[1] * contact
         if not (off or near):
             return False
-        colours = _colours(frame.image, person)
+        if near and self._overlaps is not None and self._overlaps.part(person.uv, hidden) > _FRONT:
+            return off  # someone who comes out from behind may show on the trunk
+        colours = _colours(frame.image, person, hidden)
         own = _alike(colours, one.colours)
         if near:
             return off or any(_alike(colours, other.colours) > own + _CLEAR_OVERLAP_GAIN for other in near)
@@ -253,10 +326,13 @@ class PeopleDetector:
         leaves out, unless everyone is lost; 0: all.
         """
         time, searched = frame.time, self._searched if found else 0
+        hidden = self._hidden_behind(found, time)
         everyone = self._everyone and time - self._scanned_for_all >= _SCAN_PERIOD
         if everyone:
             self._scanned_for_all, searched = time, 0
         self._add_new(frame, found, [p.expected(time) for p in self.people if self._just_lost(p, time)])
+        near = [p for _, p in found if any(_apart(crop, p.crop) < _MAY_HIDE for crop in hidden)]
+        self._add_new(frame, found, self._beside(near))
         parts = self._find(frame.image, small=everyone or not found)
         for size, crops in enumerate(parts, 1):
             if size <= searched:
@@ -268,33 +344,71 @@ class PeopleDetector:
         if everyone:
             count = 0
             while count < len(found):  # also beside people found there
-                count, beside = len(found), [crop for _, one in found for crop in _beside(one.crop)]
-                self._add_new(frame, found, beside)
+                count = len(found)
+                self._add_new(frame, found, self._beside([one for _, one in found]))
         return 0
+
+    def _beside(self, people: list[Person]) -> list[Crop]:
+        """Make crops on either side of people."""
+        shifts = (_BESIDE,) if self._overlaps is None else (_BESIDE, _OVERLAPPING)
+        return [crop for one in people for shift in shifts for crop in _beside(one.crop, shift)]
 
     def _add_new(self, frame: Frame, found: list[tuple[Followed, Person]], crops: list[Crop]) -> bool:
         """Add people in crops who have not been found yet; return whether there is one."""
         count = len(found)
         for crop in crops:
-            if len(found) >= self._most or any(_apart(crop, p.crop) < _SAME_CROP / 2 for _, p in found):
-                continue
-            person = self._landmarks(frame.image, crop)
-            if person.score < _LEAST_SCORE or any(_same(person, p) for _, p in found):
-                continue
-            person = self._landmarks(frame.image, person.crop)  # again, with a better crop
-            if person.score >= _LEAST_SCORE and not any(_same(person, p) for _, p in found):
-                one = self._who(frame, person)
-                self._add(one, frame, person, [])
-                found.append((one, person))
+            if len(found) >= self._most:
+                break
+            new = self._new(frame, found, crop)
+            if new is not None:
+                hidden = self._hidden_by(found, new)
+                one = self._who(frame, new, hidden)
+                self._add(one, frame, new, [], hidden)
+                found.append((one, new))
         return len(found) > count
+
+    def _new(self, frame: Frame, found: list[tuple[Followed, Person]], crop: Crop) -> Person | None:
+        """Find a person in a crop who has not been found yet; people who overlap are found again."""
+        if self._overlaps is not None:
+            more = self._overlaps.find_one_more([p for _, p in found], crop)
+            if more is None:
+                return None
+            for k, person in enumerate(more[0]):
+                self._replace(frame, found, k, person)
+            return more[1]
+        if any(_apart(crop, p.crop) < _SAME_CROP / 2 for _, p in found):
+            return None
+        person = self._landmarks(frame.image, crop)
+        if person.score < LEAST_SCORE or any(self._same(person, p) for _, p in found):
+            return None
+        person = self._landmarks(frame.image, person.crop)  # again, with a better crop
+        if person.score < LEAST_SCORE or any(self._same(person, p) for _, p in found):
+            return None
+        return person
+
+    def _replace(self, frame: Frame, found: list[tuple[Followed, Person]], k: int, person: Person) -> None:
+        """Replace the k-th person's observation in a frame by a better one."""
+        one = found[k][0]
+        if person is found[k][1]:
+            return
+        found[k], one.keypoints[-1] = (one, person), person
+        if one.count == 1:
+            one.colours, one.samples = None, 0
+            self._sample_colours(one, frame, person, self._hidden_by(found, person))
+
+    def _hidden_by(self, found: list[tuple[Followed, Person]], person: Person) -> Mask | None:
+        """Find where people found hide another; None if the empty scene is not known."""
+        if self._overlaps is None:
+            return None
+        return self._overlaps.hidden(person.uv, [p.uv for _, p in found if p is not person])
 
     @staticmethod
     def _just_lost(one: Followed, time: float) -> bool:
         return one.lost and time - one.times[-1] < _SCAN_PERIOD
 
-    def _who(self, frame: Frame, person: Person) -> Followed:
+    def _who(self, frame: Frame, person: Person, hidden: Mask | None) -> Followed:
         """Find the lost person whose position and colours match, or create a new one."""
-        colours = _colours(frame.image, person)
+        colours = _colours(frame.image, person, hidden)
         best, least = None, np.inf
         for one in self.people:
             gap, alike = frame.time - one.times[-1], _alike(colours, one.colours)
@@ -311,20 +425,33 @@ class PeopleDetector:
         best.lost = False
         return best
 
-    def _add(self, one: Followed, frame: Frame, person: Person, near: list[Followed]) -> None:
+    def _add(
+        self, one: Followed, frame: Frame, person: Person, near: list[Followed], hidden: Mask | None
+    ) -> None:
         """Append a person's observation in a frame."""
         one.frames.append(frame.number)
         one.times.append(frame.time)
         one.keypoints.append(person)
         one.count += 1
-        if not near or frame.time - one.times[one.free] > _LONG_CONTACT:
+        free = not near or frame.time - one.times[one.free] > _LONG_CONTACT
+        if self._overlaps is not None and not free:
+            clear = hidden is not None and self._overlaps.part(person.uv, hidden) >= _CLEAR
+            free = clear or not one.course_is_known()
+        if free:
             one.free = len(one.frames) - 1
         if one.colours is None or (not near and one.count % _SAMPLE == 0):
-            colours = _colours(frame.image, person)
-            one.samples += 1
-            if one.colours is None:
-                one.colours = np.zeros(_BINS, np.float32)
-            one.colours += (colours - one.colours) / np.float32(one.samples)
+            self._sample_colours(one, frame, person, hidden)
+
+    @staticmethod
+    def _sample_colours(one: Followed, frame: Frame, person: Person, hidden: Mask | None) -> None:
+        """Add a sample to the mean of a person's colours, if their trunk is in view."""
+        colours = _colours(frame.image, person, hidden)
+        if colours is None:
+            return
+        one.samples += 1
+        if one.colours is None:
+            one.colours = np.zeros(_BINS, np.float32)
+        one.colours += (colours - one.colours) / np.float32(one.samples)
 
 
 def detect(
@@ -337,6 +464,7 @@ def detect(
     update: Callable[[int], None] | None = None,
     correct: bool = True,
     everyone: bool = False,
+    empty: Image | None = None,
 ) -> dict[int, Keypoints]:
     """Find the keypoints of everyone in a video.
 
@@ -355,6 +483,8 @@ def detect(
         As in `PeopleDetector.keypoints`.
     everyone : bool
         Search the whole picture for small people even if larger ones were found.
+    empty : image, optional
+        As in `PeopleDetector`.
 
     Returns
     -------
@@ -366,7 +496,7 @@ def detect(
     UserError
         If the weights are missing or damaged, or the video cannot be read.
     """
-    detector = PeopleDetector(network, most, everyone)
+    detector = PeopleDetector(network, most, everyone, empty=empty)
     times = {}
     for frame in video.frames(first, stop):
         detector.step(frame)
@@ -438,30 +568,28 @@ def _apart(a: Crop, b: Crop) -> float:
     return float(np.hypot(*(a.centre - b.centre)) / min(a.side, b.side))
 
 
-def _beside(crop: Crop) -> list[Crop]:
+def _beside(crop: Crop, shift: float) -> list[Crop]:
     """Make the crops of two people of the same size who walk to the left and to the right of one."""
-    aside = np.array([_BESIDE * crop.side, 0.0])
+    aside = np.array([shift * crop.side, 0.0])
     return [crop._replace(centre=crop.centre + shift) for shift in (-aside, aside)]
 
 
-def _same(a: Person, b: Person) -> bool:
-    """Whether two sets of landmarks are of the same person."""
-    if _apart(a.crop, b.crop) < _SAME_CROP / 2:
-        return True
-    off = np.median(np.hypot(*(a.uv - b.uv).T))
-    return bool(off < _SAME_CROP / 4 * min(a.crop.side, b.crop.side))
-
-
-def _colours(image: Image, person: Person) -> Colours:
-    """Histogram of the colours of the clothes on the trunk, blurred by one bin."""
+def _colours(image: Image, person: Person, hidden: Mask | None) -> Colours | None:
+    """Histogram of the colours of the clothes on the trunk, blurred by one bin; None if it is hidden."""
     hull = cv2.convexHull(person.uv[_TORSO].astype(np.int32))
     x, y, width, height = cv2.boundingRect(hull)
     top, left = max(y, 0), max(x, 0)
     part = image[top : max(y + height, 0), left : max(x + width, 0)]
     if not part.size:
         return np.full(_BINS, 1 / np.prod(_BINS), np.float32)
-    mask = np.zeros(part.shape[:2], np.uint8)
+    rows, columns = part.shape[:2]
+    mask = np.zeros((rows, columns), np.uint8)
     cv2.fillConvexPoly(mask, hull - (left, top), 255)
+    if hidden is not None:
+        whole = np.count_nonzero(mask)
+        mask[hidden[top : top + rows, left : left + columns]] = 0
+        if np.count_nonzero(mask) < _LEAST_TRUNK * whole:
+            return None
     lab = cv2.cvtColor(part, cv2.COLOR_BGR2LAB)
     lab[..., 1:] = np.clip(lab[..., 1:], _RANGES[2], _RANGES[3] - 1)
     counts = cv2.calcHist([lab], [0, 1, 2], mask, list(_BINS), list(_RANGES))
@@ -469,6 +597,6 @@ def _colours(image: Image, person: Person) -> Colours:
     return np.asarray(blurred / max(float(blurred.sum()), 1e-9), np.float32)
 
 
-def _alike(a: Colours, b: Colours | None) -> float:
+def _alike(a: Colours | None, b: Colours | None) -> float:
     """Overlap of two histograms (Bhattacharyya), 0 to 1; 1 if one is unknown."""
-    return 1.0 if b is None else float(np.sqrt(a * b).sum())
+    return 1.0 if a is None or b is None else float(np.sqrt(a * b).sum())

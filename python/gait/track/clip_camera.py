@@ -19,6 +19,7 @@ from gait.track.stabilise import (
     find_travel,
     find_turns,
     in_words,
+    moves,
     turn_in_samples,
 )
 from gait.track.walk_camera import calibrate_film, note_camera
@@ -86,6 +87,16 @@ def camera_motion(
         without = ", without a background" if options.background == "auto" else ""
         warning(f"the camera {how} and counts as still{without}: {remedy}", options.quiet)
     return {}, None, turn
+
+
+def static_plate(
+    options: ClipOptions, video: Video, camera: Camera | None, samples: list[Frame], plate: Image | None
+) -> Image | None:
+    """Return the empty scene if the camera stands still in the samples, and otherwise None."""
+    if plate is None or not samples:
+        return plate
+    lens = camera or expected_lens(video, options.fov, samples, {})
+    return None if moves(lens, samples, {}, plate) else plate
 
 
 def motion_remedy(options: ClipOptions, turn: float | None) -> str:

@@ -13,7 +13,7 @@ from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.detections import Clip
 from gait.io.keypoints_file import Keypoints
-from gait.io.video import Video
+from gait.io.video import Image, Video
 from gait.progress import progress, warning
 from gait.track.options import ClipOptions
 
@@ -47,22 +47,26 @@ def require_detector(options: ClipOptions) -> None:
 
 
 def find_people(
-    options: ClipOptions, video: Video, model: Model, frames: range
+    options: ClipOptions, video: Video, model: Model, frames: range, empty: Image | None
 ) -> tuple[dict[int, Keypoints], int]:
     """Return everyone's keypoints, from the file or found by the detector, and the id of the main person.
 
     The detector searches the frames to track, and more around few of them if time offsets are estimated.
+    `empty`: the empty scene of a static camera, if it is known and everyone is wanted.
     """
     if options.keypoints:
         return {0: _read_keypoints(options, video, model, frames)}, 0
     if not options.further or options.offsets is not None:
-        return _detect(options, video, frames)
+        return _detect(options, video, frames, empty)
     wanted = round(_FOR_OFFSETS_S * video.fps)
     stop = min(max(frames.stop, frames.start + wanted), video.count)
-    return _detect(options, video, range(max(min(frames.start, stop - wanted), 0), stop))
+    searched = range(max(min(frames.start, stop - wanted), 0), stop)
+    return _detect(options, video, searched, empty)
 
 
-def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:
+def _detect(
+    options: ClipOptions, video: Video, frames: range, empty: Image | None
+) -> tuple[dict[int, Keypoints], int]:
     """Find everyone's keypoints with the detector, and the main person; empty without a detector."""
     if not detects(options):
         return {}, -1
@@ -73,7 +77,13 @@ def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int
     with progress("detecting", len(frames), options.quiet) as update:
         everyone = options.people is not None
         people = detector.detect(
-            video, options.network, first=frames.start, stop=frames.stop, update=update, everyone=everyone
+            video,
+            options.network,
+            first=frames.start,
+            stop=frames.stop,
+            update=update,
+            everyone=everyone,
+            empty=empty,
         )
     if not options.camera:
         detector.require_person(people, video)

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gait.camera.camera import Camera
+from gait.detect.outline import ANKLES, draw_person
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image
 
@@ -22,17 +22,7 @@ Array = NDArray[np.float64]
 TRACKED, OTHER = 1, 2
 """Numbers of the tracked person, and of all others, where they are nearest."""
 
-_HEIGHTS = 1.28  # height of a person over the distance from shoulder to ankle
-_HEAD_CIRCLE = (0.115, 0.085)  # heights: centre of the head above the shoulders, and its radius
-_TRUNK = ("l_shoulder", "r_shoulder", "r_hip", "l_hip")
-_TRUNK_EDGE = 0.06  # heights by which clothes reach beyond shoulders and hips
-_LIMB_RADII = {
-    ("shoulder", "elbow"): 0.075, ("elbow", "wrist"): 0.065, ("hip", "knee"): 0.115, ("knee", "ankle"): 0.09,
-    ("ankle", "toe"): 0.07, ("ankle", "heel"): 0.07,
-}  # fmt: skip
-"""Width of a limb with clothes, heights."""
 _STANCE_S = 0.25  # seconds before and after, within which the lowest ankle is on the ground
-_ANKLES = ("l_ankle", "r_ankle")
 _CLOTHES_REACH = 0.3  # by which head and clothes extend beyond the joints, in distances from shoulder to foot
 _REGION = 0.8  # heights; radius around a person's middle in which the tracker uses the picture
 
@@ -53,7 +43,7 @@ class Outline:
     def __init__(self, keypoints: Keypoints, fps: float, camera: Camera) -> None:
         self._first, self._names = int(keypoints.frame[0]), list(keypoints.names)
         self._uv = camera.undistorted(_filled(keypoints.uv))
-        ankles = self._uv[:, [self._names.index(name) for name in _ANKLES], 1].max(axis=1)
+        ankles = self._uv[:, [self._names.index(name) for name in ANKLES], 1].max(axis=1)
         reach = max(1, round(_STANCE_S * fps))
         padded = np.pad(ankles, reach, mode="edge")
         self._foot = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
@@ -76,26 +66,7 @@ class Outline:
         row = number - self._first
         if self.box(number) is None:
             return
-        at = dict(zip(self._names, self._uv[row], strict=True))
-        shoulders, hips = (0.5 * (at[f"l_{name}"] + at[f"r_{name}"]) for name in ("shoulder", "hip"))
-        ankle = max((at[name] for name in _ANKLES), key=lambda one: float(one[1]))
-        tall = _HEIGHTS * float(np.hypot(*(shoulders - ankle)))
-        trunk = cv2.convexHull(np.rint([at[name] for name in _TRUNK]).astype(np.int32))
-        cv2.fillConvexPoly(canvas, trunk, value)
-        cv2.polylines(canvas, [trunk], True, value, _pixels(2 * _TRUNK_EDGE * tall))
-        up = (shoulders - hips) / max(float(np.hypot(*(shoulders - hips))), 1e-6)
-        cv2.circle(
-            canvas,
-            _point(shoulders + _HEAD_CIRCLE[0] * tall * up),
-            _pixels(_HEAD_CIRCLE[1] * tall),
-            value,
-            -1,
-        )
-        for (upper, lower), width in _LIMB_RADII.items():
-            for side in "lr":
-                ends = at.get(f"{side}_{upper}"), at.get(f"{side}_{lower}")
-                if ends[0] is not None and ends[1] is not None:
-                    cv2.line(canvas, _point(ends[0]), _point(ends[1]), value, _pixels(width * tall))
+        draw_person(canvas, dict(zip(self._names, self._uv[row], strict=True)), value)
 
 
 class OtherPeople:
@@ -177,12 +148,3 @@ def _filled(uv: Array) -> Array:
         if found.any():
             column[:] = np.interp(rows, rows[found], column[found])
     return out
-
-
-def _point(at: Array) -> tuple[int, int]:
-    x, y = np.clip(np.rint(at), -32000, 32000).astype(int)
-    return int(x), int(y)
-
-
-def _pixels(length: float) -> int:
-    return int(np.clip(round(length), 1, 255))

@@ -12,7 +12,7 @@ from gait.io.video import Video, background
 from gait.progress import progress, warning
 from gait.track.camera_check import contradiction
 from gait.track.clip_background import sample
-from gait.track.clip_camera import calibrate_clip, camera_motion, given_camera
+from gait.track.clip_camera import calibrate_clip, camera_motion, given_camera, static_plate
 from gait.track.clip_keypoints import cut_to, detects, find_people, require_detector
 from gait.track.first_state import read_start, who_starts
 from gait.track.keypoint_start import keypoint_noise
@@ -50,7 +50,11 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
         if beside is None:
             with progress("background", video.count, options.quiet) as update:
                 samples, plate = sample(options, video, poses, update)
-        people, person = find_people(options, video, model, frames)
+        empty = None
+        if options.people is not None and beside is not None and not poses:
+            samples, plate = beside.result()
+            empty = static_plate(options, video, camera, samples, plate if given is None else given)
+        people, person = find_people(options, video, model, frames, empty)
         if beside is not None:
             samples, plate = beside.result()
     longer = people

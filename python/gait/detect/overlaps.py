@@ -1,0 +1,190 @@
+"""Landmarks of people who overlap in the picture of a static camera whose empty scene is known.
+
+A landmark network that sees one person beside another finds joints of both.  Before it looks for a person,
+the empty scene is put in place of the others, where these are nearer.  People whose boxes are one, and those
+who come out from behind another, are found in what then remains in front of the empty scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.detect.networks import LANDMARK_JOINTS, LEAST_SCORE, Crop, Person
+from gait.detect.outline import draw_person
+from gait.errors import UserError
+from gait.io.video import Image
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+"""Pixels of the picture (h, w) in which others hide a person."""
+
+_LEAST_DIFFERENCE = 20  # grey levels by which the foreground differs from the empty scene in some channel
+_LEAST_PART = 0.2  # of a person's area that must not be hidden
+_LEAST_FOREGROUND = 0.4  # share of that part that must be foreground
+_LEAST_GAIN = 0.3  # share of a new person's area that is foreground and that no one else covers
+_LEAST_REMAINS = 0.04  # share of the middle of a crop that must be foreground of no one found so far
+_ROUNDS = 2  # in which a new person and those beside them are found in turn
+_REACH = 1.0  # crop sides; people further apart do not overlap
+_SAME_JOINTS = 1 / 16  # crop sides; median distance of joints up to which two people are one
+
+
+class Overlaps:
+    """Finds landmarks of people, each without the others.
+
+    Parameters
+    ----------
+    empty : image
+        The empty scene, BGR.
+    landmarks : callable
+        Finds the person in a crop of a picture, as `LandmarkNetwork` does.
+    """
+
+    def __init__(self, empty: Image, landmarks: Callable[[Image, Crop], Person]) -> None:
+        self._empty, self._landmarks = empty, landmarks
+        self._smooth = _smooth(empty)
+        self._image = empty
+        self._foreground: Mask = np.zeros(empty.shape[:2], bool)
+
+    def see(self, image: Image) -> None:
+        """Go on to the next picture.
+
+        Raises
+        ------
+        UserError
+            If it has another size than the empty scene.
+        """
+        if image.shape != self._empty.shape:
+            raise UserError(
+                "the empty scene and the pictures differ in size; give a background of this camera"
+            )
+        self._image = image
+        self._foreground = np.abs(_smooth(image) - self._smooth).max(axis=2) > _LEAST_DIFFERENCE
+
+    def find(self, crop: Crop, own: Array | None, others: Sequence[Array]) -> tuple[Person, Mask | None]:
+        """Find the landmarks of the person in a crop, and where others hide them.
+
+        A person who is hardly visible, or not in front of the empty scene, has score 0.
+
+        Parameters
+        ----------
+        crop : Crop
+        own : ndarray of shape (16, 2), optional
+            Expected joints; by default the person is taken to be behind the others.
+        others : sequence of ndarray of shape (16, 2)
+            Joints of people who may hide them.
+        """
+        if not others:
+            return self._landmarks(self._image, crop), None
+        hidden = self.hidden(own, others)
+        picture = np.where(hidden[..., None], self._empty, self._image)
+        person = self._landmarks(picture, crop)
+        if own is not None:
+            hidden = self.hidden(person.uv, others)
+        area = self._area([person.uv])
+        visible = area & ~hidden
+        foreground = int((visible & self._foreground).sum())
+        if visible.sum() < _LEAST_PART * area.sum() or foreground < _LEAST_FOREGROUND * visible.sum():
+            person = person._replace(score=0.0)
+        return person, hidden
+
+    def find_one_more(self, people: Sequence[Person], crop: Crop) -> tuple[list[Person], Person] | None:
+        """Find another person in a crop, and find those beside them again; None if there is no one else.
+
+        Returns
+        -------
+        people : list of Person
+            As given, those beside the new person without them.
+        person : Person
+            The new one.
+        """
+        joints = [one.uv for one in people]
+        if people and not self._remains(joints, crop):
+            return None
+        new, _ = self.find(crop, None, joints)
+        if new.score < LEAST_SCORE:
+            return None
+        near = [k for k, one in enumerate(people) if overlap(one.crop, new.crop)]
+        found = [*(people[k] for k in near), new]
+        for _ in range(_ROUNDS if near else 1):
+            for k in sorted(range(len(found)), key=lambda k: foot(found[k].uv), reverse=True):
+                others = [one.uv for j, one in enumerate(found) if j != k]
+                found[k], _ = self.find(found[k].crop, found[k].uv, others)
+                if found[k].score < LEAST_SCORE:
+                    return None
+        new = found.pop()
+        if any(same_joints(new, one) for one in found):
+            return None
+        before = self._area([people[k].uv for k in near])
+        after = self._area([one.uv for one in (*found, new)])
+        gain = int((after & self._foreground).sum()) - int((before & self._foreground).sum())
+        if near and gain < _LEAST_GAIN * self._area([new.uv]).sum():
+            return None
+        again = list(people)
+        for k, one in zip(near, found, strict=True):
+            again[k] = one
+        return again, new
+
+    def hidden(self, own: Array | None, others: Sequence[Array]) -> Mask:
+        """Find the pixels (h, w) in which one of the others is nearer than a person with joints `own`.
+
+        On level ground nearer feet are lower in the picture.
+        """
+        canvas = np.zeros(self._foreground.shape, np.uint8)
+        behind = [] if own is None else [uv for uv in others if foot(uv) < foot(own)]
+        for uv in behind:
+            _draw(canvas, uv, 1)
+        if own is not None:
+            _draw(canvas, own, 0)
+        for uv in others if own is None else [uv for uv in others if foot(uv) >= foot(own)]:
+            _draw(canvas, uv, 1)
+        return canvas > 0
+
+    def part(self, uv: Array, hidden: Mask | None) -> float:
+        """Return the share of a person's area that is not hidden."""
+        if hidden is None:
+            return 1.0
+        area = self._area([uv])
+        return float((area & ~hidden).sum() / max(int(area.sum()), 1))
+
+    def _area(self, people: Sequence[Array]) -> Mask:
+        """Find the pixels (h, w) that people with these joints cover."""
+        canvas = np.zeros(self._foreground.shape, np.uint8)
+        for uv in people:
+            _draw(canvas, uv, 1)
+        return canvas > 0
+
+    def _remains(self, people: Sequence[Array], crop: Crop) -> bool:
+        """Whether the middle of a crop shows enough foreground that no one covers."""
+        left, top = (max(int(at - crop.side / 4), 0) for at in crop.centre)
+        right, bottom = (max(int(at + crop.side / 4), 0) for at in crop.centre)
+        middle = (slice(top, bottom), slice(left, right))
+        remains = self._foreground[middle] & ~self._area(people)[middle]
+        return bool(remains.sum() > _LEAST_REMAINS * (crop.side / 2) ** 2)
+
+
+def overlap(a: Crop, b: Crop) -> bool:
+    """Whether the people in two crops may overlap."""
+    return bool(np.hypot(*(a.centre - b.centre)) < _REACH * min(a.side, b.side))
+
+
+def same_joints(a: Person, b: Person) -> bool:
+    """Whether the landmarks of two people are at the same place."""
+    off = np.median(np.hypot(*(a.uv - b.uv).T))
+    return bool(off < _SAME_JOINTS * min(a.crop.side, b.crop.side))
+
+
+def foot(uv: Array) -> float:
+    """Row of the lowest joint of a person (16, 2)."""
+    return float(uv[:, 1].max())
+
+
+def _draw(canvas: Image, uv: Array, value: int) -> None:
+    draw_person(canvas, dict(zip(LANDMARK_JOINTS, uv, strict=True)), value)
+
+
+def _smooth(image: Image) -> NDArray[np.int16]:
+    return np.asarray(cv2.blur(image, (3, 3)), np.int16)

@@ -1,0 +1,133 @@
+"""Landmarks of people who overlap in the picture, with the empty scene in place of the others."""
+
+import numpy as np
+import pytest
+
+from gait.camera.camera import Camera
+from gait.detect.networks import LANDMARK_JOINTS, Crop, Person
+from gait.detect.outline import draw_person
+from gait.detect.overlaps import Overlaps, foot, same_joints
+from gait.errors import UserError
+from gait.io.video import Frame
+from gait.track.clip_camera import static_plate
+from gait.track.options import ClipOptions
+
+HEIGHT, WIDTH = 240, 320
+EMPTY = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
+
+
+def joints(u, lowest=200.0):
+    """Joints (16, 2) of a person from the front."""
+    sides = [1, -1] * 8
+    across = np.repeat([9, 13, 14, 6, 6, 6, 6, 7], 2) * sides
+    down = np.repeat([28, 50, 68, 72, 104, 134, 138, 140], 2)
+    return np.column_stack([u + across, down + lowest - 140.0]).astype(float)
+
+
+def crop_of(uv):
+    return Crop(np.array([uv[:, 0].mean(), foot(uv) - 70]), 200.0, 0.0)
+
+
+def person(uv, score=0.9):
+    return Person(score, uv, np.ones(16), crop_of(uv))
+
+
+def area(uv):
+    canvas = np.zeros((HEIGHT, WIDTH), np.uint8)
+    draw_person(canvas, dict(zip(LANDMARK_JOINTS, uv, strict=True)), 1)
+    return canvas > 0
+
+
+def picture(*people):
+    """Draw people, each with joints and a grey level, the nearest last."""
+    image = EMPTY.copy()
+    for uv, level in people:
+        image[area(uv)] = level
+    return image
+
+
+class Network:
+    """Finds one person in the middle of all that differs from the empty scene, as if it were one person's."""
+
+    def __init__(self):
+        self.picture = None
+
+    def __call__(self, image, crop):
+        self.picture = image
+        columns = np.nonzero((image != EMPTY).any(axis=2))[1]
+        left, right = crop.centre[0] - crop.side / 8, crop.centre[0] + crop.side / 8
+        columns = columns[(columns > left) & (columns < right)]
+        return person(joints(columns.mean())) if len(columns) > 10 else person(joints(0.0), 0.0)
+
+
+def overlaps(*people):
+    network = Network()
+    one = Overlaps(EMPTY, network)
+    one.see(picture(*people))
+    return one, network
+
+
+FAR, NEAR = joints(150.0, 195.0), joints(165.0, 200.0)
+
+
+def test_others_are_replaced_by_the_empty_scene_where_they_are_nearer():
+    one, network = overlaps((FAR, 200), (NEAR, 30))
+    behind, hidden = one.find(crop_of(FAR), FAR, [NEAR])
+    assert (network.picture[area(NEAR)] == 90).all() and (network.picture == 200).any()
+    assert behind.score > 0.5 and not (hidden & ~area(NEAR)).any()
+    one.find(crop_of(NEAR), NEAR, [FAR])
+    assert (network.picture[area(NEAR)] == 30).all() and not (network.picture == 200).any()
+
+
+def test_without_others_the_picture_is_left_as_it_is():
+    one, network = overlaps((FAR, 200))
+    _, hidden = one.find(crop_of(FAR), FAR, [])
+    assert hidden is None and (network.picture == picture((FAR, 200))).all()
+    assert one.part(FAR, hidden) == 1
+
+
+def test_someone_who_is_hidden_is_not_found():
+    hardly = joints(166.0, 199.0)
+    one, _ = overlaps((hardly, 200), (NEAR, 30))
+    assert one.find(crop_of(hardly), hardly, [NEAR])[0].score == 0
+
+
+def test_landmarks_in_the_empty_scene_are_no_person():
+    one, network = overlaps((NEAR, 30))
+    one._landmarks = lambda image, crop: person(joints(60.0))
+    assert one.find(crop_of(NEAR), joints(60.0), [NEAR])[0].score == 0
+
+
+def test_two_people_taken_for_one_become_two():
+    left, right = joints(105.0), joints(160.0)
+    one, network = overlaps((left, 200), (right, 30))
+    both = network(picture((left, 200), (right, 30)), crop_of(joints(130.0)))
+    assert both.uv[:, 0].mean() > 120
+    found = one.find_one_more([both], crop_of(joints(175.0)))
+    assert found is not None
+    places = sorted(p.uv[:, 0].mean() for p in (*found[0], found[1]))
+    assert places[0] < 115 and places[1] > 152 and not same_joints(found[0][0], found[1])
+
+
+def test_no_one_is_added_to_one_person():
+    one, network = overlaps((NEAR, 30))
+    alone = network(picture((NEAR, 30)), crop_of(NEAR))
+    assert one.find_one_more([alone], crop_of(joints(140.0))) is None
+    one._remains = lambda people, crop: True  # even if something remains
+    assert one.find_one_more([alone], crop_of(joints(140.0))) is None
+
+
+def test_an_empty_scene_of_another_size_is_refused():
+    with pytest.raises(UserError, match="size"):
+        Overlaps(EMPTY, Network()).see(EMPTY[1:])
+
+
+@pytest.mark.parametrize(("shift", "known"), [(0, True), (9, False)])
+def test_a_camera_that_moves_has_no_empty_scene(shift, known):
+    plate = np.random.default_rng(1).integers(0, 255, (HEIGHT // 8, WIDTH // 8, 3), np.uint8)
+    plate = plate.repeat(8, axis=0).repeat(8, axis=1)
+    samples = [Frame(n, n / 25, np.roll(plate, n * shift, axis=1)) for n in range(8)]
+    camera = Camera(WIDTH, HEIGHT, 300.0, 300.0, 160.0, 120.0, np.eye(3), np.zeros(3))
+    options = ClipOptions("v.mp4", "c.json", "t.csv", people=8)
+    assert (static_plate(options, None, camera, samples, plate) is plate) == known
+    assert static_plate(options, None, camera, samples, None) is None
