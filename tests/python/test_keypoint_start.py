@@ -20,7 +20,16 @@ def model():
 @pytest.fixture(scope="module")
 def camera():
     rotation = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
-    return Camera(1280, 720, 1000, 1000, 639.5, 359.5, R=np.array(rotation, float), t=np.array([0, 1.5, 0]))
+    return Camera(
+        1280,
+        720,
+        1000,
+        1000,
+        639.5,
+        359.5,
+        R=np.array(rotation, float),
+        t=np.array([0, 1.5, 0]),
+    )
 
 
 def walk(model, camera, frames, *, heading=0.3, speed=1.3, stands=0, noise=2.0):
@@ -36,7 +45,11 @@ def walk(model, camera, frames, *, heading=0.3, speed=1.3, stands=0, noise=2.0):
     uv = np.array(uv) + noise * rng.standard_normal((frames, len(LANDMARK_JOINTS), 2))
     number = np.arange(frames)
     return Keypoints(
-        number, number / FPS, tuple(LANDMARK_JOINTS), uv, np.ones((frames, len(LANDMARK_JOINTS)))
+        number,
+        number / FPS,
+        tuple(LANDMARK_JOINTS),
+        uv,
+        np.ones((frames, len(LANDMARK_JOINTS))),
     )
 
 
@@ -52,6 +65,15 @@ def test_a_person_who_stands_first_is_found_walking(model, camera):
     start = find_keypoint_start(walk(model, camera, 90, stands=50), camera, model, height=1.75)
     assert start.frame > 30
     assert start.mean.heading == pytest.approx(0.3, abs=0.15)
+
+
+def test_the_best_second_is_chosen_if_all_are_searched(model, camera):
+    keypoints = walk(model, camera, 75)
+    keypoints.uv[:20] += np.random.default_rng(1).normal(0, 12, (20, *keypoints.uv.shape[1:]))
+    assert find_keypoint_start(keypoints, camera, model, height=1.75).frame == 0
+    start = find_keypoint_start(keypoints, camera, model, height=1.75, search_all=True)
+    assert 15 <= start.frame <= 55
+    assert start.mean.heading == pytest.approx(0.3, abs=0.1)
 
 
 def test_points_that_are_no_walk_start_nothing(model, camera):

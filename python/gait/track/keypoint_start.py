@@ -21,6 +21,7 @@ from gait.errors import GaitError
 from gait.io.keypoints_file import Keypoints
 
 _KEYPOINT_WINDOW_S = 1.0  # seconds of keypoints that are fitted
+_WHOLE = 0.8  # share of the most frames of a window from which one counts as whole
 _WINDOW_STEP_S = 0.2  # seconds from one window to the next
 _BEST_WINDOW_CHI2 = (
     4.0  # chi-square per coordinate up to which the best window is used if no window shows a walk
@@ -57,6 +58,7 @@ def find_keypoint_start(
     stop: int | None = None,
     height: float | None = None,
     poses: Mapping[int, CameraPose] | None = None,
+    search_all: bool = False,
 ) -> Start | None:
     """Find the first state of a person from their keypoints.
 
@@ -72,6 +74,9 @@ def find_keypoint_start(
         Known stature, metres.
     poses : mapping of int to CameraPose, optional
         Pose of the camera in each frame, if it moves.
+    search_all : bool
+        Choose the second with the best fit, of those with most frames, instead of the first; for people who
+        may be hidden.
 
     Returns
     -------
@@ -86,6 +91,8 @@ def find_keypoint_start(
     chosen = (keypoints.frame >= first) & (keypoints.frame < (np.inf if stop is None else stop))
     chosen &= keypoints.visible.any(axis=1)
     frames, times = keypoints.frame[chosen], keypoints.time[chosen]
+    count = np.searchsorted(times, times + _KEYPOINT_WINDOW_S) - np.arange(len(times))
+    walk: tuple[Start, Hypothesis] | None = None
     best: tuple[Start, Hypothesis] | None = None
     begin = -np.inf
     for at, time in enumerate(times):
@@ -97,10 +104,21 @@ def find_keypoint_start(
             continue
         start, hypothesis = found
         if hypothesis.walks:
-            return start
-        if best is None or hypothesis.chi2_per_observation < best[1].chi2_per_observation:
+            if not search_all:
+                return start
+            whole = count[at] >= _WHOLE * count.max()
+            if walk is None or (whole and _better(hypothesis, walk[1])):
+                walk = found
+        if best is None or _better(hypothesis, best[1]):
             best = found
+    if walk is not None:
+        return walk[0]
     return best[0] if best is not None and best[1].chi2_per_observation < _BEST_WINDOW_CHI2 else None
+
+
+def _better(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether a walk fits its second better than another."""
+    return one.chi2_per_observation < other.chi2_per_observation
 
 
 def _fit_window(
