@@ -4,9 +4,9 @@
     eval_people.py [--record] [--seeds 301-310] [--frames 54] [--jobs 1]
 
 Simulated people (gait simulate --people) who cross, from the side and at 45 degrees, with each seed; and,
-with the first seed, three people abreast and one who overtakes.  Each clip is tracked by gait track --people
-all with its camera, its background and the detector; then each person in a clip of the same scene without the
-others.  Clips and tracks are kept in build/eval-people.
+with the first four seeds, three people abreast and one who overtakes.  Each clip is tracked by gait track
+--people all with its camera, its background and the detector; then each person in a clip of the same scene
+without the others.  Clips and tracks are kept in build/eval-people.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ from gait.track.people import numbered, track_people
 FOLDER = Path(__file__).resolve().parents[2] / "build" / "eval-people"
 SIZE = 320, 240
 FPS = 24.0
+TOGETHER = 4  # seeds, the first, also with people who walk the same way
 NEAR = 0.5  # metres from a pelvis within which a track is of that person
 SWITCHED = 0.25  # seconds for which a switched track is nearer to another person than to its own
 #: Largest error of each person relative to them alone; least share of crossings without a switch.
@@ -56,7 +57,12 @@ def main() -> int:
     args = options.parse_args()
     first, last = map(int, args.seeds.split("-"))
     cases = [("crossing", view, seed) for seed in range(first, last + 1) for view in ("side", "oblique")]
-    cases += [(kind, view, first) for kind in ("abreast", "overtaking") for view in ("side", "oblique")]
+    cases += [
+        (kind, view, seed)
+        for kind in ("abreast", "overtaking")
+        for view in ("side", "oblique")
+        for seed in range(first, min(first + TOGETHER, last + 1))
+    ]
     rows: list[list[object]] = []
     kept, costs = 0, []
     with ProcessPoolExecutor(args.jobs, mp_context=get_context("spawn")) as pool:
@@ -65,7 +71,7 @@ def main() -> int:
             kept += right
             costs.append(cost)
     crossings = sum(kind == "crossing" for kind, _, _ in cases)
-    ratios = [float(row[5]) for row in rows if str(row[0]).startswith("crossing")]  # type: ignore[arg-type]
+    ratios = ratios_of(rows, "crossing")
     strays = sum(int(row[8]) for row in rows)  # type: ignore[call-overload]
     median = float(np.nanmedian(ratios))
     cost = float(np.median(costs))
@@ -83,11 +89,32 @@ def main() -> int:
         f"{len(ratios)} people in crossings (target: all), median {median:.2f}. "
         f"Frames of `tracking` without a person: {strays} (target: 0). CPU time of the whole command for "
         f"all together, relative to the sum of each alone: median over clips {cost:.2f}, at most "
-        f"{max(costs):.2f} (target: at most {COST})."
+        f"{max(costs):.2f} (target: at most {COST}).\n\n"
+        "People who walk the same way, with the first seeds: "
+        + "; ".join(
+            in_words(rows, kind, view) for kind in ("abreast", "overtaking") for view in ("side", "oblique")
+        )
+        + "."
     )
     head = ["clip", "seed", "person", "together", "alone", "ratio", "lost", "switched", "false"]
     table.publish("people", "Several people in one clip", head, rows, note, record=args.record)
     return int(missed)
+
+
+def ratios_of(rows: list[list[object]], kind: str) -> list[float]:
+    """Errors together over those alone, of everyone in clips of a kind; NaN if not tracked."""
+    return [float(row[5]) for row in rows if str(row[0]).startswith(kind)]  # type: ignore[arg-type]
+
+
+def in_words(rows: list[list[object]], kind: str, view: str) -> str:
+    """How many people in clips of a kind and view are tracked, and how well."""
+    ratios = np.array(ratios_of(rows, f"{kind}, {view}"))
+    tracked = ratios[np.isfinite(ratios)]
+    median = f", median {np.median(tracked):.2f}" if len(tracked) else ""
+    return (
+        f"{kind}, {view}: {len(tracked)} of {len(ratios)} tracked, ratio at most {WANTED[0]} for "
+        f"{(tracked <= WANTED[0]).sum()}{median}"
+    )
 
 
 def scenario_of(kind: str, view: str, seed: int, frames: int) -> Scenario:
@@ -112,9 +139,25 @@ def measured(scenario: Scenario) -> tuple[list[list[object]], bool, float]:
         lost = own[k].status.count("lost") if k in own else None
         kind = f"{scenario.people}, {scenario.view}"
         stray_here = stray if k == 1 else 0
-        rows.append([kind, scenario.seed, k, among, alone, among / alone, lost, int(switched), stray_here])
+        rows.append(
+            [
+                kind,
+                scenario.seed,
+                k,
+                among,
+                alone,
+                among / alone,
+                lost,
+                int(switched),
+                stray_here,
+            ]
+        )
         print(*rows[-1], file=sys.stderr, flush=True)
-    return rows, scenario.people == "crossing" and not switched and len(own) == count, cost
+    return (
+        rows,
+        scenario.people == "crossing" and not switched and len(own) == count,
+        cost,
+    )
 
 
 def made(scenario: Scenario) -> Path:
@@ -140,7 +183,12 @@ def options_of(folder: Path, video: str, output: str, people: int | None = None)
     """Options of a track: all that is known of a clip except who is in it."""
     camera, background = str(folder / "camera.json"), str(folder / "background.png")
     return ClipOptions(
-        str(folder / video), camera, str(folder / output), background=background, people=people, quiet=True
+        str(folder / video),
+        camera,
+        str(folder / output),
+        background=background,
+        people=people,
+        quiet=True,
     )
 
 
