@@ -219,6 +219,7 @@ static void test_implausible(gait_tracker *t)
         strata *const of = &t->history.strata[c->generation];
         SPOIL(s->reported, int32_t, -1, TOY_CLASSES);
         SPOIL(s->supported, int32_t, -1, TOY_CLASSES);
+        SPOIL(s->moved_class, int32_t, -1, TOY_CLASSES);
         SPOIL(s->resampled, int64_t, -1, INT64_MAX);
         SPOIL(s->moved, int64_t, INT64_MIN, INT64_MAX);
         SPOIL(s->score[1][0], float, TOO_LARGE);

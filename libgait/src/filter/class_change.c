@@ -43,14 +43,14 @@ void class_change_enter(const class_entry *e, int32_t from, int32_t i, particle_
     bool const other_curves = m->curves != before->curves;
     float n[4], resumed[4];
     normals(e, i, 1, resumed);
-    bool const resumes =
-        e->resumes && before->direction == 0 && m->motion_class == 0 && resumed[0] < NEVER_STOOD;
+    bool const resumes = e->resumes && before->direction == 0 && resumed[0] < NEVER_STOOD;
     normals(e, i, 0, n);
     p->f[F_HEADING] = m_wrap_pi(p->f[F_HEADING] + JITTER_HEADING * n[0]);
     if (m->direction == 0)
         p->f[F_PHASE] = 0.0f;
     else if (resumes)
-        p->f[F_PHASE] = m_wrap1(e->phase + e->seconds * p->f[F_RATE] + RESUMED_SD * resumed[1]);
+        p->f[F_PHASE] =
+            m_wrap1(e->phase + (float)m->direction * e->seconds * p->f[F_RATE] + RESUMED_SD * resumed[1]);
     else if (before->direction == 0)
         p->f[F_PHASE] = first_phase(change, n[1], n[3]);
     if (m->direction != 0 && !resumes && (before->direction == 0 || other_curves))

@@ -12,9 +12,9 @@ typedef struct class_entry {    /* how particles begin in a class */
     uint32_t frame;     /* counter of the random numbers */
     const float *score; /* scores of the person in that class */
     float score_sd;     /* their standard deviation */
-    bool resumes;       /* the person has stood for a moment only, perhaps not at all: */
-    float phase;        /* before that, */
-    float seconds;      /* since when they may have walked on */
+    bool resumes;  /* the person has stood for a moment only, perhaps not at all, and moved in this class: */
+    float phase;   /* before that, */
+    float seconds; /* since when they may have gone on */
 } class_entry;
 
 /* Particle i, until now of class `from`. */

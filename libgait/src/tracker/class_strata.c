@@ -181,10 +181,10 @@ void class_strata_enter(const gait_tracker *t, uint32_t counter, float dt, int32
                            .frame = counter,
                            .score = s->score[to],
                            .score_sd = s->known >> to & 1u ? SCORE_SD : 1.0f,
-                           .resumes = class_stands(t, s->reported) &&
+                           .resumes = to == s->moved_class && class_stands(t, s->reported) &&
                                       t->core->hypotheses.stage == HYPOTHESES_ONE && still < STILL_TIME,
                            .phase = t->core->reported_phase,
-                           .seconds = in_walking_time(t, 1e-6f * (float)still) - dt};
+                           .seconds = in_walking_time(t, 1e-6f * (float)still - dt)};
     for (int32_t lane = 0; lane < lanes; lane++) {
         particle_state one;
         if (t->origin[first + lane] == to)
@@ -277,7 +277,9 @@ void class_strata_report(gait_tracker *t, const particle_state *mean, gait_estim
             memcpy(s->score[c], mean->f + F_COEF, sizeof s->score[c]);
             s->known |= 1u << c;
         }
-    if (!still)
+    if (!still) {
         s->moved = age;
+        s->moved_class = now;
+    }
     s->reported = now;
 }

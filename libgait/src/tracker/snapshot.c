@@ -14,7 +14,7 @@ typedef struct snapshot_header {
 
 static const char MAGIC[7] = {'G', 'A', 'I', 'T', 'S', 'N', 'P'};
 /* Raised by every change of the state that is saved.  10 (then the magic's last character) may lack fit_margin. */
-enum { FORMAT = 12 };
+enum { FORMAT = 13 };
 
 static size_t state_bytes(const gait_tracker *t)
 {
@@ -182,7 +182,8 @@ static bool classes_plausible(const gait_tracker *t, const unsigned char *body)
     if (!t->classes || !c.started)
         return true;
     memcpy(&s, in_body(t, body, t->classes), sizeof s);
-    bool ok = (uint32_t)s.reported < classes && (uint32_t)s.supported < classes && s.resampled >= 0 &&
+    bool ok = (uint32_t)s.reported < classes && (uint32_t)s.supported < classes &&
+              (uint32_t)s.moved_class < classes && s.resampled >= 0 &&
               s.resampled <= c.utime - c.start_utime && s.moved >= 0 && s.moved <= c.utime - c.start_utime &&
               moderate(s.score[0], GAIT_MAX_CLASSES * GAIT_MAX_COMPONENTS) && moderate(s.drift, 2);
     for (int32_t k = 0; ok && k < h->depth && ((uint64_t)k < c.frame || k == 0); k++) {

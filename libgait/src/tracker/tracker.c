@@ -91,7 +91,8 @@ static void draw_classes(gait_tracker *t, const gait_hypothesis *const *from, in
     const strata *const s = tracker_strata(t);
     for (int32_t k = 0; k < s->count; k++)
         draw_range(t, from, n, total, s->motion_class[k], s->first[k], s->first[k + 1]);
-    t->classes->reported = t->classes->supported = from[0]->mean.motion_class;
+    class_state *const state = t->classes;
+    state->reported = state->supported = state->moved_class = from[0]->mean.motion_class;
 }
 
 void tracker_start(gait_tracker *t, const gait_hypothesis *h, int32_t count, bool sure, int64_t utime)

@@ -72,11 +72,12 @@ typedef struct strata {
 typedef struct class_state { /* of a model with several classes (class_strata.h) */
     /* Microseconds since the start: last resampling; last estimate that moves. */
     int64_t resampled, moved;
+    int32_t moved_class;         /* of that estimate; of the start, if none has moved */
     int32_t reported, supported; /* class of the last estimate, and of core.last_supported */
     int32_t open_sides;          /* 1: the person stood still, so left and right will be split */
     uint32_t known;              /* bit c: there are scores of the person in class c */
-    float
-        drift[2]; /* of the estimates that stand, over the ground, mean of the last ones: metres per second */
+    /* Of the estimates that stand, over the ground, mean of the last ones: metres per second. */
+    float drift[2];
     float score[GAIT_MAX_CLASSES][GAIT_MAX_COMPONENTS];
 } class_state;
 
