@@ -54,7 +54,7 @@ EDITS: dict[str, tuple[eval_edits.Edit, tuple[str, ...]]] = {
 def make(folder: Path, jobs: int, update: Callable[[int], None]) -> None:
     """Make the cases that `folder` lacks; a case exists if its meta.json does."""
     folder.mkdir(parents=True, exist_ok=True)
-    missing = {name: case for name, case in (CASES | _running(folder)).items() if not _made(folder / name)}
+    missing = {name: case for name, case in (CASES | running(folder)).items() if not _made(folder / name)}
     done = 0
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         for _ in pool.map(_simulate, missing.values(), [folder / name for name in missing]):
@@ -73,7 +73,7 @@ def _made(folder: Path) -> bool:
     return (folder / "meta.json").is_file()
 
 
-def _running(folder: Path) -> dict[str, Scenario]:
+def running(folder: Path) -> dict[str, Scenario]:
     """The runner's scenario, whose model is learnt first; nothing if the recording is absent."""
     if not RUNNER.is_file():
         return {}
