@@ -5,10 +5,10 @@
 
 Simulated walks by two cameras (gait simulate --cameras 2) of people with the proportions of textbooks (table)
 and with those of people who were recorded (drawn); and the development clips, one camera, each with a model
-learnt without its subject.  own: the body from a first pass (gait track --body auto), two cameras; live: the
-proportions vary among the particles (setting `proportions` of the tracker).  With the detector and all
-defaults, one run each.  The development clips alone have a page of their own.  Clips and tracks are kept in
-build/eval-cameras.
+learnt without its subject.  own: the body from a first pass, as by gait track --body auto, which refuses a
+single camera; live: the proportions vary among the particles (setting `proportions` of the tracker).  With
+the detector and all defaults, one run each.  The development clips alone have a page of their own.  Clips and
+tracks are kept in build/eval-cameras.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Case:
 
 
 def main() -> int:
-    """Make, track, compare, print; 1 if the own body is not better in a group of two cameras."""
+    """Make, track, compare, print; 1 if the own body is not better in a group."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--seeds", default="501,502")
     options.add_argument("--frames", type=int, default=90)
@@ -73,8 +73,7 @@ def main() -> int:
             print(case.folder.name, case.group, found[case], file=sys.stderr)
             update(len(found))
     rows = [
-        [case.folder.name, case.group]
-        + [round(arms[arm][k]) if arm in arms else "-" for k in range(len(MEASURES)) for arm in ARMS]
+        [case.folder.name, case.group] + [round(arms[arm][k]) for k in range(len(MEASURES)) for arm in ARMS]
         for case, arms in found.items()
     ]
     note, missed = words(found)
@@ -118,10 +117,9 @@ def measured(case: Case) -> dict[str, tuple[float, ...]]:
 
     track_scene(options, scene, start, first.add)
     found = {"model": judged(case, output)}
-    if case.further:
-        own = replace(scene, model=own_model(options, scene, first))
-        track_scene(options, own, first_state(options, own))
-        found["own"] = judged(case, output)
+    own = replace(scene, model=own_model(options, scene, first))
+    track_scene(options, own, first_state(options, own))
+    found["own"] = judged(case, output)
     with patch.object(TrackerConfig, "default", varied):
         track_scene(options, scene, start)
     return found | {"live": judged(case, output)}
@@ -137,14 +135,12 @@ def judged(case: Case, output: Path) -> tuple[float, ...]:
 
 
 def words(found: dict[Case, dict[str, tuple[float, ...]]]) -> tuple[str, bool]:
-    """Sum up each group; return whether the own body is not better in one that has it."""
+    """Sum up each group; return whether the own body is not better in one."""
     lines, missed = [], False
     for group in dict.fromkeys(case.group for case in found):
         arms = [found[case] for case in found if case.group == group]
         parts = []
         for arm in ARMS:
-            if arm not in arms[0]:
-                continue
             poses, plain = (np.array([one[which][0] for one in arms]) for which in (arm, "model"))
             parts.append(f"{arm} {np.median(poses):.1f}, at most {poses.max():.1f}")
             if arm != "model":
