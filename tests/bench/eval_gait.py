@@ -2,10 +2,12 @@
 """What a gait lab compares: footfalls, gait parameters and joint angles of tracks against the truth.
 
     make eval-gait                           the development clips
+    make eval-gait ARGS='--from-truth'       started from the truth, without the detector
     make eval-gait ARGS='--simulated DIR'    slow, fast, asymmetric and aided walks by gait simulate instead
 
-Each clip is tracked by `gait track --smooth --draws` with a model learnt without its subject, from the truth
-with the noise of `eval_clips`; the arm `track` is the same without --smooth.  For comparison there are two
+Each clip is tracked by `gait track --smooth --draws` with a model learnt without its subject, as users track,
+with an automatic start and the detector; with --from-truth, from the truth with the noise of `eval_clips` and
+without the detector.  The arm `track` is the same without --smooth.  For comparison there are two
 baselines: a pose that does not move, and the mean cycle that continues from the true start.  Angles of all
 motions come from the same fit of a skeleton to joints (`gait.export.angles`), so a constant error of an angle
 is a difference of joint centres.
@@ -159,6 +161,7 @@ def main() -> int:
         metavar="S",
         help="of the simulated people, for choices: not 0 (0)",
     )
+    add("--from-truth", action="store_true", help="start from the truth with noise, without the detector")
     add("--jobs", type=int, default=2, metavar="J", help="clips side by side (2)")
     add("--record", metavar="NAME", help="write tests/bench/results/NAME.md and NAME.csv")
     args = parser.parse_args()
@@ -193,41 +196,34 @@ def _runs(clips: list[Clip], args: argparse.Namespace) -> list[Run]:
     with progress("learning", None) as update:
         models = eval_clips.models(clips, eval_clips.ROOT / "build" / "eval" / "models", args.jobs, update)
     tasks = [
-        (clip, models.get(clip.subject or ""), seed) for seed in range(1, args.seeds + 1) for clip in clips
+        (clip, _folder(clip, model := models.get(clip.subject or ""), seed, args.from_truth), model, seed)
+        for seed in range(1, args.seeds + 1)
+        for clip in clips
     ]
     runs: list[Run] = []
     with progress("tracking", len(tasks)) as update, ThreadPoolExecutor(args.jobs) as pool:
-        for done, _ in enumerate(pool.map(lambda task: _track(*task), tasks), 1):
+        for done, _ in enumerate(pool.map(lambda task: _track(*task, args.from_truth), tasks), 1):
             update(done)
-    for clip, model, seed in tasks:
-        runs += _judged(clip, model, seed)
+    for task in tasks:
+        runs += _judged(*task)
     return runs
 
 
-def _folder(clip: Clip, model: Path | None, seed: int) -> Path:
-    """Start of the names of a run's files; another one for every state of what was learnt."""
-    return OUT / clip.folder.parent.name / f"{clip.name}.{model.stem if model else 'walk'}.{seed}"
+def _folder(clip: Clip, model: Path | None, seed: int, from_truth: bool) -> Path:
+    """Folder of a run's files; another one for every state of what was learnt."""
+    start = "truth" if from_truth else "auto"
+    return OUT / clip.folder.parent.name / f"{clip.name}.{model.stem if model else 'walk'}.{start}.{seed}"
 
 
-def _track(clip: Clip, model: Path | None, seed: int) -> None:
+def _track(clip: Clip, folder: Path, model: Path | None, seed: int, from_truth: bool) -> None:
     """Track with and without --smooth, unless that has been done."""
-    folder = _folder(clip, model, seed)
     folder.mkdir(parents=True, exist_ok=True)
-    init = folder / "init.json"
-    init.write_text(json.dumps(eval_clips.noisy_start(clip, seed, 0.0)))
-    words = [
-        "track",
-        clip.video,
-        "--camera",
-        clip.camera,
-        "--init",
-        init,
-        "--seed",
-        seed,
-        "--detector",
-        "none",
-    ]
-    words += ["--quiet", *(["--background", clip.plate] if clip.plate else [])]
+    words = ["track", clip.video, "--camera", clip.camera, "--seed", seed, "--quiet"]
+    if from_truth:
+        init = folder / "init.json"
+        init.write_text(json.dumps(eval_clips.noisy_start(clip, seed, 0.0)))
+        words += ["--init", init, "--detector", "none"]
+    words += ["--background", clip.plate] if clip.plate else []
     words += ["--model", model] if model else []
     for name, more in (("smooth", ["--smooth", "--draws", folder / "draws.npz"]), ("track", [])):
         target = folder / f"{name}.csv"
@@ -239,9 +235,9 @@ def _track(clip: Clip, model: Path | None, seed: int) -> None:
             raise UserError(f"gait track of {clip.name}, seed {seed}: {done.stderr.strip()}")
 
 
-def _judged(clip: Clip, model: Path | None, seed: int) -> Iterator[Run]:
+def _judged(clip: Clip, folder: Path, model: Path | None, seed: int) -> Iterator[Run]:
     """Compare the arms with the truth; baselines do not depend on the seed."""
-    folder, truth = _folder(clip, model, seed), read_truth(clip.truth)
+    truth = read_truth(clip.truth)
     events = true_events(truth, clip.folder / "meta.json")
     for arm in ARMS[:2]:
         track = read_track(folder / f"{arm}.csv")
