@@ -20,16 +20,7 @@ def model():
 @pytest.fixture(scope="module")
 def camera():
     rotation = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
-    return Camera(
-        1280,
-        720,
-        1000,
-        1000,
-        639.5,
-        359.5,
-        R=np.array(rotation, float),
-        t=np.array([0, 1.5, 0]),
-    )
+    return Camera(1280, 720, 1000, 1000, 639.5, 359.5, R=np.array(rotation, float), t=np.array([0, 1.5, 0]))
 
 
 def walk(model, camera, frames, *, heading=0.3, speed=1.3, stands=0, noise=2.0):
@@ -45,11 +36,7 @@ def walk(model, camera, frames, *, heading=0.3, speed=1.3, stands=0, noise=2.0):
     uv = np.array(uv) + noise * rng.standard_normal((frames, len(LANDMARK_JOINTS), 2))
     number = np.arange(frames)
     return Keypoints(
-        number,
-        number / FPS,
-        tuple(LANDMARK_JOINTS),
-        uv,
-        np.ones((frames, len(LANDMARK_JOINTS))),
+        number, number / FPS, tuple(LANDMARK_JOINTS), uv, np.ones((frames, len(LANDMARK_JOINTS)))
     )
 
 
@@ -67,13 +54,32 @@ def test_a_person_who_stands_first_is_found_walking(model, camera):
     assert start.mean.heading == pytest.approx(0.3, abs=0.15)
 
 
-def test_the_best_second_is_chosen_if_all_are_searched(model, camera):
+def test_the_best_second_is_chosen_if_wanted(model, camera):
     keypoints = walk(model, camera, 75)
     keypoints.uv[:20] += np.random.default_rng(1).normal(0, 12, (20, *keypoints.uv.shape[1:]))
     assert find_keypoint_start(keypoints, camera, model, height=1.75).frame == 0
-    start = find_keypoint_start(keypoints, camera, model, height=1.75, search_all=True)
+    start = find_keypoint_start(keypoints, camera, model, height=1.75, best_second=True)
     assert 15 <= start.frame <= 55
     assert start.mean.heading == pytest.approx(0.3, abs=0.1)
+
+
+def test_a_whole_second_is_preferred_to_part_of_one(model, camera):
+    keypoints = walk(model, camera, 75)
+    keypoints.uv[25:] += np.random.default_rng(1).normal(0, 4, (50, *keypoints.uv.shape[1:]))
+    seen = np.ones(75, bool)
+    seen[1:25:2] = False  # the first second has the better points, and half of the frames
+    part = Keypoints(*(values[seen] for values in (keypoints.frame, keypoints.time)), keypoints.names,
+                     keypoints.uv[seen], keypoints.confidence[seen])  # fmt: skip
+    assert find_keypoint_start(part, camera, model, height=1.75).frame == 0
+    assert find_keypoint_start(part, camera, model, height=1.75, best_second=True).frame >= 14
+
+
+def test_the_best_second_is_looked_for_soon_after_the_first_walk(model, camera, monkeypatch):
+    keypoints = walk(model, camera, 75)
+    keypoints.uv[:50] += np.random.default_rng(1).normal(0, 12, (50, *keypoints.uv.shape[1:]))
+    monkeypatch.setattr("gait.track.keypoint_start._CHOICE_S", 0.5)
+    start = find_keypoint_start(keypoints, camera, model, height=1.75, best_second=True)
+    assert start.frame <= 15
 
 
 def test_points_that_are_no_walk_start_nothing(model, camera):

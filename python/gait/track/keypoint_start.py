@@ -1,7 +1,7 @@
 """The start of a track from the keypoints of a clip: the first second in which a person walks.
 
 Windows of one second are fitted in turn (`gait.bindings.start_fit`), so a person who stands at first, or
-comes into view late, is found as soon as they walk.
+comes into view late, is found as soon as they walk.  Among other people, the best second soon after is used.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from gait.io.keypoints_file import Keypoints
 _KEYPOINT_WINDOW_S = 1.0  # seconds of keypoints that are fitted
 _WHOLE = 0.8  # share of the most frames of a window from which one counts as whole
 _WINDOW_STEP_S = 0.2  # seconds from one window to the next
+_CHOICE_S = 5.0  # seconds, from the first whole window that shows a walk, in which a better one is looked for
 _BEST_WINDOW_CHI2 = (
     4.0  # chi-square per coordinate up to which the best window is used if no window shows a walk
 )
@@ -58,7 +59,7 @@ def find_keypoint_start(
     stop: int | None = None,
     height: float | None = None,
     poses: Mapping[int, CameraPose] | None = None,
-    search_all: bool = False,
+    best_second: bool = False,
 ) -> Start | None:
     """Find the first state of a person from their keypoints.
 
@@ -74,9 +75,9 @@ def find_keypoint_start(
         Known stature, metres.
     poses : mapping of int to CameraPose, optional
         Pose of the camera in each frame, if it moves.
-    search_all : bool
-        Choose the second with the best fit, of those with most frames, instead of the first; for people who
-        may be hidden.
+    best_second : bool
+        Choose the second with the best fit within 5 s, of those with most frames, instead of the first; for
+        people who may be hidden.
 
     Returns
     -------
@@ -92,33 +93,30 @@ def find_keypoint_start(
     chosen &= keypoints.visible.any(axis=1)
     frames, times = keypoints.frame[chosen], keypoints.time[chosen]
     count = np.searchsorted(times, times + _KEYPOINT_WINDOW_S) - np.arange(len(times))
-    walk: tuple[Start, Hypothesis] | None = None
+    walks: list[tuple[bool, float, Start]] = []
     best: tuple[Start, Hypothesis] | None = None
-    begin = -np.inf
+    begin, end = -np.inf, np.inf
     for at, time in enumerate(times):
         if time < begin + _WINDOW_STEP_S:
             continue
+        if time > end:
+            break
         begin = time
         found = _fit_window(fit, by_frame, frames, times, at, poses or {})
         if found is None:
             continue
         start, hypothesis = found
         if hypothesis.walks:
-            if not search_all:
+            if not best_second:
                 return start
-            whole = count[at] >= _WHOLE * count.max()
-            if walk is None or (whole and _better(hypothesis, walk[1])):
-                walk = found
-        if best is None or _better(hypothesis, best[1]):
+            part = bool(count[at] < _WHOLE * count.max())
+            walks.append((part, hypothesis.chi2_per_observation, start))
+            end = end if part else min(end, time + _CHOICE_S)
+        if best is None or hypothesis.chi2_per_observation < best[1].chi2_per_observation:
             best = found
-    if walk is not None:
-        return walk[0]
+    if walks:
+        return min(walks, key=lambda walk: walk[:2])[2]
     return best[0] if best is not None and best[1].chi2_per_observation < _BEST_WINDOW_CHI2 else None
-
-
-def _better(one: Hypothesis, other: Hypothesis) -> bool:
-    """Whether a walk fits its second better than another."""
-    return one.chi2_per_observation < other.chi2_per_observation
 
 
 def _fit_window(

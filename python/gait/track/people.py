@@ -110,7 +110,7 @@ def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
             stop=scene.frames.stop,
             height=options.height if id == scene.person else None,
             poses=scene.poses,
-            search_all=True,
+            best_second=True,
         )
         if found is None or not found.hypotheses[0].walks:
             warning(f"person {id} is not tracked: no second in which they walk in full view", options.quiet)
