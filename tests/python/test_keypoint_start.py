@@ -66,15 +66,15 @@ def test_the_best_second_is_chosen_if_wanted(model, camera):
 def test_a_whole_second_is_preferred_to_part_of_one(model, camera):
     keypoints = walk(model, camera, 75)
     keypoints.uv[25:] += np.random.default_rng(1).normal(0, 4, (50, *keypoints.uv.shape[1:]))
-    seen = np.ones(75, bool)
-    seen[1:25:2] = False  # the first second has the better points, and half of the frames
-    part = Keypoints(*(values[seen] for values in (keypoints.frame, keypoints.time)), keypoints.names,
-                     keypoints.uv[seen], keypoints.confidence[seen])  # fmt: skip
+    visible = np.ones(75, bool)
+    visible[1:25:2] = False  # the first second has the better points, and half of the frames
+    part = Keypoints(*(values[visible] for values in (keypoints.frame, keypoints.time)), keypoints.names,
+                     keypoints.uv[visible], keypoints.confidence[visible])  # fmt: skip
     assert find_keypoint_start(part, camera, model, height=1.75).frame == 0
     assert find_keypoint_start(part, camera, model, height=1.75, best_second=True).frame >= 14
 
 
-def test_the_best_second_is_looked_for_soon_after_the_first_walk(model, camera, monkeypatch):
+def test_the_best_second_is_soon_after_the_first_walk(model, camera, monkeypatch):
     keypoints = walk(model, camera, 75)
     keypoints.uv[:50] += np.random.default_rng(1).normal(0, 12, (50, *keypoints.uv.shape[1:]))
     monkeypatch.setattr("gait.track.keypoint_start._CHOICE_S", 0.5)
