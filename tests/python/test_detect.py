@@ -58,6 +58,7 @@ class Stage:
         image = np.zeros((200, 640, 3), np.uint8)
         for name, place in places.items():
             image[50:180, max(int(place) - 20, 0) : int(place) + 20] = RED if name.startswith("red") else BLUE
+        self.image = image
         found = self.detector.step(Frame(number, number / 25, image))
         return {one.id: float(person.uv[:, 0].mean()) for one, person in found}
 
@@ -105,6 +106,23 @@ def test_people_who_overlap_from_the_first_frame_are_both_followed(stage):
             pytest.approx(100 + 5 * n),
             pytest.approx(140 + 6 * n),
         ]
+
+
+def seen(stage, number, **places):
+    """Two people followed through a frame, the second beside the first; the frame, and what was found."""
+    stage.step(number, **places)
+    one, other = stage.detector.people
+    frame = Frame(number + 1, (number + 1) / 25, stage.image)
+    return one, other, frame, one.keypoints[-1]
+
+
+def test_a_neighbour_of_unknown_colours_makes_no_one_strange(stage):
+    one, other, frame, person = seen(stage, 0, red=200, blue=260)
+    other.colours = None
+    one.colours = 0.6 * one.colours + 0.4 * people._colours(frame.image, other.keypoints[-1], None)  # of both
+    assert not stage.detector._strange(one, frame, person, [other], None)
+    other.colours = people._colours(frame.image, person, None)
+    assert stage.detector._strange(one, frame, person, [other], None)
 
 
 def test_one_who_walks_on_behind_a_wall_has_the_old_id(stage):

@@ -314,7 +314,8 @@ class PeopleDetector:
         colours = _colours(frame.image, person, hidden)
         own = _alike(colours, one.colours)
         if near:
-            return off or any(_alike(colours, other.colours) > own + _CLEAR_OVERLAP_GAIN for other in near)
+            known = [other.colours for other in near if other.colours is not None]
+            return off or any(_alike(colours, other) > own + _CLEAR_OVERLAP_GAIN for other in known)
         return own < _COLOUR_OVERLAP
 
     def _scan(self, frame: Frame, found: list[tuple[Followed, Person]]) -> int:
