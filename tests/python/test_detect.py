@@ -125,6 +125,14 @@ def test_a_neighbour_of_unknown_colours_makes_no_one_strange(stage):
     assert stage.detector._strange(one, frame, person, [other], None)
 
 
+@pytest.mark.parametrize(("seconds", "same"), [(1.0, True), (50.0, False)])
+def test_one_whose_trunk_is_hidden_gets_an_old_id_only_soon_after(stage, seconds, same):
+    one, other, frame, person = seen(stage, 0, red=200, blue=500)
+    one.lost = True
+    frame = frame._replace(time=one.times[-1] + seconds)
+    assert (stage.detector._who(frame, person, np.ones((200, 640), bool)) is one) == same
+
+
 def test_one_who_walks_on_behind_a_wall_has_the_old_id(stage):
     for n in range(80):
         found = stage.step(n, **({} if 20 <= n < 60 else {"red": 40 + 6 * n}))

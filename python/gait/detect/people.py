@@ -413,7 +413,8 @@ class PeopleDetector:
         best, least = None, np.inf
         for one in self.people:
             gap, alike = frame.time - one.times[-1], _alike(colours, one.colours)
-            if not one.lost or gap > _FORGET or alike < _COLOUR_OVERLAP:
+            longest = _LONGEST_HIDDEN if colours is None or one.colours is None else _FORGET
+            if not one.lost or gap > longest or alike < _COLOUR_OVERLAP:
                 continue
             reach = _SAME_CROP + _CROP_SPEED * gap
             stayed = _apart(person.crop, one.keypoints[-1].crop) / reach
