@@ -125,6 +125,20 @@ def test_a_neighbour_of_unknown_colours_makes_no_one_strange(stage):
     assert stage.detector._strange(one, frame, person, [other], None)
 
 
+def test_one_in_front_of_another_is_told_by_the_course_and_near_a_lost_one_by_the_colours(stage):
+    """With someone in front, who is in view, colours of the other on the trunk do not matter."""
+    empty = np.zeros((200, 640, 3), np.uint8)
+    stage.detector = people.PeopleDetector(everyone=True, empty=empty)
+    one, other, frame, person = seen(stage, 0, red=200, blue=260)
+    one.colours, other.colours = other.colours, one.colours  # the trunk shows the other's
+    hidden = stage.detector._overlaps.hidden
+    front = hidden(person.uv, [person.uv + (30, -1)])
+    assert not stage.detector._strange(one, frame, person, [other], front)
+    assert stage.detector._strange(one, frame, person, [other], hidden(person.uv, [person.uv + (30, 1)]))
+    other.lost = True
+    assert stage.detector._strange(one, frame, person, [other], None)
+
+
 @pytest.mark.parametrize(("seconds", "same"), [(1.0, True), (50.0, False)])
 def test_one_whose_trunk_is_hidden_gets_an_old_id_only_soon_after(stage, seconds, same):
     one, other, frame, person = seen(stage, 0, red=200, blue=500)

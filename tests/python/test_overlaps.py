@@ -83,7 +83,6 @@ def test_without_others_the_picture_is_left_as_it_is():
     one, network = overlaps((FAR, 200))
     _, hidden = one.find(crop_of(FAR), FAR, [])
     assert hidden is None and (network.picture == picture((FAR, 200))).all()
-    assert one.part(FAR, hidden) == 1
 
 
 def test_someone_who_is_hidden_is_not_found():

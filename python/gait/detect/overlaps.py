@@ -143,10 +143,8 @@ class Overlaps:
             _draw(canvas, uv, 1)
         return canvas > 0
 
-    def part(self, uv: Array, hidden: Mask | None) -> float:
+    def part(self, uv: Array, hidden: Mask) -> float:
         """Return the share of a person's area that is not hidden."""
-        if hidden is None:
-            return 1.0
         area = self._area([uv])
         return float((area & ~hidden).sum() / max(int(area.sum()), 1))
 

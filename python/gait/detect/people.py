@@ -309,7 +309,7 @@ class PeopleDetector:
         off = one.off_course(frame.time, person) > _OFF_COURSE[0] + _OFF_COURSE[1] * contact
         if not (off or near):
             return False
-        if near and self._overlaps is not None and self._overlaps.part(person.uv, hidden) > _FRONT:
+        if near and self._in_view(person, hidden) > _FRONT:
             return off  # someone who comes out from behind may show on the trunk
         colours = _colours(frame.image, person, hidden)
         own = _alike(colours, one.colours)
@@ -397,6 +397,12 @@ class PeopleDetector:
             one.colours, one.samples = None, 0
             self._sample_colours(one, frame, person, self._hidden_by(found, person))
 
+    def _in_view(self, person: Person, hidden: Mask | None) -> float:
+        """Share of a person that others leave in view; 0 if it is not known."""
+        if self._overlaps is None or hidden is None:
+            return 0.0
+        return self._overlaps.part(person.uv, hidden)
+
     def _hidden_by(self, found: list[tuple[Followed, Person]], person: Person) -> Mask | None:
         """Find where people found hide another; None if the empty scene is not known."""
         if self._overlaps is None:
@@ -437,8 +443,7 @@ class PeopleDetector:
         one.count += 1
         free = not near or frame.time - one.times[one.free] > _LONG_CONTACT
         if self._overlaps is not None and not free:
-            clear = hidden is not None and self._overlaps.part(person.uv, hidden) >= _CLEAR
-            free = clear or not one.course_is_known()
+            free = self._in_view(person, hidden) >= _CLEAR or not one.course_is_known()
         if free:
             one.free = len(one.frames) - 1
         if one.colours is None or (not near and one.count % _SAMPLE == 0):
