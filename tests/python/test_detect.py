@@ -49,9 +49,12 @@ class Stage:
         )
         if abs(near - crop.centre[0]) > 60:
             return Person(0.1, np.zeros((16, 2)), np.zeros(16), crop)
-        x = near + 15.0 * np.array([1, -1] * 8)
+        return self.person(near)
+
+    def person(self, place):
+        x = place + 15.0 * np.array([1, -1] * 8)
         y = np.array([60, 60, 75, 75, 90, 90, 110, 110, 140, 140, 170, 170, 172, 172, 174, 174.0])
-        return Person(0.9, np.column_stack([x, y]), np.ones(16), self.crop(near))
+        return Person(0.9, np.column_stack([x, y]), np.ones(16), self.crop(place))
 
     def step(self, number, **places):
         self.places = places
@@ -137,6 +140,28 @@ def test_one_in_front_of_another_is_told_by_the_course_and_near_a_lost_one_by_th
     assert stage.detector._strange(one, frame, person, [other], hidden(person.uv, [person.uv + (30, 1)]))
     other.lost = True
     assert stage.detector._strange(one, frame, person, [other], None)
+
+
+def lowered(person, by):
+    return person._replace(uv=person.uv + (0.0, by))
+
+
+def test_a_new_person_is_known_by_colours_without_the_clothes_of_one_found_in_front(stage, monkeypatch):
+    stage.detector = people.PeopleDetector(empty=np.zeros((200, 640, 3), np.uint8))
+    stage.step(0, red=200, blue=220)
+    frame = Frame(1, 0.04, stage.image)
+    behind, front = stage.person(200), lowered(stage.person(220), 1.0)
+    one = people.Followed(3)
+    stage.detector._add(one, frame, behind, [], None)
+    mixed = one.colours
+    found = [(one, behind)]
+    monkeypatch.setattr(
+        stage.detector._overlaps, "find_one_more", lambda found, crop: ([lowered(behind, 0.5)], front)
+    )
+    assert stage.detector._add_new(frame, found, [front.crop])
+    stage.step(2, red=200)
+    red = people._colours(stage.image, behind, None)
+    assert people._alike(one.colours, red) > 0.95 > people._alike(mixed, red)
 
 
 @pytest.mark.parametrize(("seconds", "same"), [(1.0, True), (50.0, False)])

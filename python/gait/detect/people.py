@@ -360,42 +360,45 @@ class PeopleDetector:
         for crop in crops:
             if len(found) >= self._most:
                 break
-            new = self._new(frame, found, crop)
-            if new is not None:
-                hidden = self._hidden_by(found, new)
-                one = self._who(frame, new, hidden)
-                self._add(one, frame, new, [], hidden)
-                found.append((one, new))
+            more = self._new(frame, [p for _, p in found], crop)
+            if more is None:
+                continue
+            again, new = more
+            hidden = self._hidden_by(again, new)
+            one = self._who(frame, new, hidden)
+            self._add(one, frame, new, [], hidden)
+            found.append((one, new))
+            self._replace(frame, found, again)
         return len(found) > count
 
-    def _new(self, frame: Frame, found: list[tuple[Followed, Person]], crop: Crop) -> Person | None:
-        """Find a person in a crop who has not been found yet; people who overlap are found again."""
+    def _new(self, frame: Frame, found: list[Person], crop: Crop) -> tuple[list[Person], Person] | None:
+        """Find a person in a crop who has not been found yet; also return those found.
+
+        People who overlap the new person are found again, if the empty scene is known.
+        """
         if self._overlaps is not None:
-            more = self._overlaps.find_one_more([p for _, p in found], crop)
-            if more is None:
-                return None
-            for k, person in enumerate(more[0]):
-                self._replace(frame, found, k, person)
-            return more[1]
-        if any(_apart(crop, p.crop) < _SAME_CROP / 2 for _, p in found):
+            return self._overlaps.find_one_more(found, crop)
+        if any(_apart(crop, p.crop) < _SAME_CROP / 2 for p in found):
             return None
         person = self._landmarks(frame.image, crop)
-        if person.score < LEAST_SCORE or any(self._same(person, p) for _, p in found):
+        if person.score < LEAST_SCORE or any(self._same(person, p) for p in found):
             return None
         person = self._landmarks(frame.image, person.crop)  # again, with a better crop
-        if person.score < LEAST_SCORE or any(self._same(person, p) for _, p in found):
+        if person.score < LEAST_SCORE or any(self._same(person, p) for p in found):
             return None
-        return person
+        return found, person
 
-    def _replace(self, frame: Frame, found: list[tuple[Followed, Person]], k: int, person: Person) -> None:
-        """Replace the k-th person's observation in a frame by a better one."""
-        one = found[k][0]
-        if person is found[k][1]:
-            return
-        found[k], one.keypoints[-1] = (one, person), person
-        if one.count == 1:
-            one.colours, one.samples = None, 0
-            self._sample_colours(one, frame, person, self._hidden_by(found, person))
+    def _replace(self, frame: Frame, found: list[tuple[Followed, Person]], again: list[Person]) -> None:
+        """Replace the first people's observations in a frame by better ones, and new people's colours."""
+        changed = [k for k, person in enumerate(again) if person is not found[k][1]]
+        for k in changed:
+            one = found[k][0]
+            found[k], one.keypoints[-1] = (one, again[k]), again[k]
+        for one, person in (found[k] for k in changed):
+            if one.count == 1:
+                one.colours, one.samples = None, 0
+                hidden = self._hidden_by([p for _, p in found], person)
+                self._sample_colours(one, frame, person, hidden)
 
     def _in_view(self, person: Person, hidden: Mask | None) -> float:
         """Share of a person that others leave in view; 0 if it is not known."""
@@ -403,11 +406,11 @@ class PeopleDetector:
             return 0.0
         return self._overlaps.part(person.uv, hidden)
 
-    def _hidden_by(self, found: list[tuple[Followed, Person]], person: Person) -> Mask | None:
+    def _hidden_by(self, found: list[Person], person: Person) -> Mask | None:
         """Find where people found hide another; None if the empty scene is not known."""
         if self._overlaps is None:
             return None
-        return self._overlaps.hidden(person.uv, [p.uv for _, p in found if p is not person])
+        return self._overlaps.hidden(person.uv, [p.uv for p in found if p is not person])
 
     @staticmethod
     def _just_lost(one: Followed, time: float) -> bool:
