@@ -116,6 +116,17 @@ def test_no_one_is_added_to_one_person():
     assert one.find_one_more([alone], crop_of(joints(140.0))) is None
 
 
+@pytest.mark.parametrize(
+    ("u", "width", "enough"), [(160, 15, True), (160, 9, False), (0, 9, True), (0, 4, False)]
+)
+def test_someone_new_needs_foreground_in_the_part_of_a_crop_that_is_in_the_picture(u, width, enough):
+    image = EMPTY.copy()
+    image[:, u : u + width] = 200
+    one = Overlaps(EMPTY, Network())
+    one.see(image)
+    assert one._remains([], Crop(np.array([u, 120.0]), 200.0, 0.0)) == enough
+
+
 def test_an_empty_scene_of_another_size_is_refused():
     with pytest.raises(UserError, match="size"):
         Overlaps(EMPTY, Network()).see(EMPTY[1:])

@@ -156,12 +156,12 @@ class Overlaps:
         return canvas > 0
 
     def _remains(self, people: Sequence[Array], crop: Crop) -> bool:
-        """Whether the middle of a crop shows enough foreground that no one covers."""
+        """Whether enough of a crop's middle in the picture is foreground that no one covers."""
         left, top = (max(int(at - crop.side / 4), 0) for at in crop.centre)
         right, bottom = (max(int(at + crop.side / 4), 0) for at in crop.centre)
         middle = (slice(top, bottom), slice(left, right))
         remains = self._foreground[middle] & ~self._area(people)[middle]
-        return bool(remains.sum() > _LEAST_REMAINS * (crop.side / 2) ** 2)
+        return bool(remains.sum() > _LEAST_REMAINS * remains.size)
 
 
 def overlap(a: Crop, b: Crop) -> bool:
