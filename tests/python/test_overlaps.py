@@ -127,6 +127,17 @@ def test_someone_new_needs_foreground_in_the_part_of_a_crop_that_is_in_the_pictu
     assert one._remains([], Crop(np.array([u, 120.0]), 200.0, 0.0)) == enough
 
 
+def test_someone_whom_the_empty_scene_shows_is_found_if_no_one_else_is_near():
+    stands, near, away = joints(262.0), joints(220.0), joints(58.0)
+    for walks, found in ((away, True), (near, False)):
+        one = Overlaps(picture((stands, 30)), Network())
+        one.see(picture((stands, 30), (walks, 200)))
+        more = one.find_one_more([person(walks)], crop_of(stands))
+        assert (more is not None) == found
+    more = one.find_one_more([], crop_of(stands))
+    assert more is not None and abs(more[1].uv[:, 0].mean() - 262) < 5
+
+
 def test_an_empty_scene_of_another_size_is_refused():
     with pytest.raises(UserError, match="size"):
         Overlaps(EMPTY, Network()).see(EMPTY[1:])
