@@ -164,6 +164,22 @@ def test_a_new_person_is_known_by_colours_without_the_clothes_of_one_found_in_fr
     assert people._alike(one.colours, red) > 0.95 > people._alike(mixed, red)
 
 
+@pytest.mark.parametrize(("shift", "taken"), [(14.0, True), (60.0, False)])
+def test_a_person_found_again_beside_a_new_one_stays_on_the_course(stage, monkeypatch, shift, taken):
+    stage.detector = people.PeopleDetector(empty=np.zeros((200, 640, 3), np.uint8))
+    for n in range(10):
+        stage.step(n, red=200 + 4 * n)
+    one = stage.detector.people[0]
+    last = one.keypoints[-1]
+    again, new = stage.person(236 + shift), stage.person(400)
+    found = [(one, last)]
+    monkeypatch.setattr(stage.detector._overlaps, "find_one_more", lambda found, crop: ([again], new))
+    assert stage.detector._add_new(Frame(9, 0.36, stage.image), found, [new.crop])
+    assert found[0][1] is one.keypoints[-1] is (again if taken else last)
+    new = last  # no one else, as the one found stays where it is
+    assert stage.detector._add_new(Frame(9, 0.36, stage.image), found[:1], [new.crop]) == taken
+
+
 @pytest.mark.parametrize(("seconds", "same"), [(1.0, True), (50.0, False)])
 def test_one_whose_trunk_is_hidden_gets_an_old_id_only_soon_after(stage, seconds, same):
     one, other, frame, person = seen(stage, 0, red=200, blue=500)

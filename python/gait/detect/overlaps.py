@@ -8,6 +8,7 @@ who come out from behind another, are found in what then remains in front of the
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -118,16 +119,16 @@ class Overlaps:
                 if found[k].score < LEAST_SCORE:
                     return None
         new = found.pop()
-        if any(same_joints(new, one) for one in found):
+        again = list(people)
+        for k, one in zip(near, found, strict=True):
+            again[k] = one
+        if not distinct([*again, new]):
             return None
         before = self._area([people[k].uv for k in near])
         after = self._area([one.uv for one in (*found, new)])
         gain = int((after & self._foreground).sum()) - int((before & self._foreground).sum())
         if near and gain < _LEAST_GAIN * self._area([new.uv]).sum():
             return None
-        again = list(people)
-        for k, one in zip(near, found, strict=True):
-            again[k] = one
         return again, new
 
     def hidden(self, own: Array | None, others: Sequence[Array]) -> Mask:
@@ -175,6 +176,11 @@ def same_joints(a: Person, b: Person) -> bool:
     """Whether the landmarks of two people are at the same place."""
     off = np.median(np.hypot(*(a.uv - b.uv).T))
     return bool(off < _SAME_JOINTS * min(a.crop.side, b.crop.side))
+
+
+def distinct(people: Sequence[Person]) -> bool:
+    """Whether no two of these people are at the same place."""
+    return not any(same_joints(a, b) for a, b in combinations(people, 2))
 
 
 def foot(uv: Array) -> float:

@@ -34,7 +34,7 @@ from gait.detect.networks import (
     PersonNetwork,
     whole_picture,
 )
-from gait.detect.overlaps import Mask, Overlaps, foot, overlap, same_joints
+from gait.detect.overlaps import Mask, Overlaps, distinct, foot, overlap, same_joints
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
@@ -138,6 +138,11 @@ class Followed:
         for values in (self.frames, self.times, self.keypoints):
             del values[:begin]
         self.free -= begin
+
+    def leaves_course(self, time: float, person: Person) -> bool:
+        """Whether a detected person is too far from the course."""
+        contact = time - self.times[self.free]
+        return self.off_course(time, person) > _OFF_COURSE[0] + _OFF_COURSE[1] * contact
 
     def off_course(self, time: float, person: Person) -> float:
         """Distance of a detected person from the course, crop sides."""
@@ -305,8 +310,7 @@ class PeopleDetector:
         self, one: Followed, frame: Frame, person: Person, near: list[Followed], hidden: Mask | None
     ) -> bool:
         """Whether the person found in a crop is not the one that the crop was made for."""
-        contact = frame.time - one.times[one.free]
-        off = one.off_course(frame.time, person) > _OFF_COURSE[0] + _OFF_COURSE[1] * contact
+        off = one.leaves_course(frame.time, person)
         if not (off or near):
             return False
         if near and self._in_view(person, hidden) > _FRONT:
@@ -360,7 +364,7 @@ class PeopleDetector:
         for crop in crops:
             if len(found) >= self._most:
                 break
-            more = self._new(frame, [p for _, p in found], crop)
+            more = self._new(frame, found, crop)
             if more is None:
                 continue
             again, new = more
@@ -371,22 +375,33 @@ class PeopleDetector:
             self._replace(frame, found, again)
         return len(found) > count
 
-    def _new(self, frame: Frame, found: list[Person], crop: Crop) -> tuple[list[Person], Person] | None:
+    def _new(
+        self, frame: Frame, found: list[tuple[Followed, Person]], crop: Crop
+    ) -> tuple[list[Person], Person] | None:
         """Find a person in a crop who has not been found yet; also return those found.
 
-        People who overlap the new person are found again, if the empty scene is known.
+        People who overlap the new person are found again, if the empty scene is known, unless that would take
+        them off their course.
         """
+        before = [p for _, p in found]
         if self._overlaps is not None:
-            return self._overlaps.find_one_more(found, crop)
-        if any(_apart(crop, p.crop) < _SAME_CROP / 2 for p in found):
+            more = self._overlaps.find_one_more(before, crop)
+            if more is None:
+                return None
+            again = [
+                old if one.course_is_known() and one.leaves_course(frame.time, better) else better
+                for (one, old), better in zip(found, more[0], strict=True)
+            ]
+            return (again, more[1]) if distinct([*again, more[1]]) else None
+        if any(_apart(crop, p.crop) < _SAME_CROP / 2 for p in before):
             return None
         person = self._landmarks(frame.image, crop)
-        if person.score < LEAST_SCORE or any(self._same(person, p) for p in found):
+        if person.score < LEAST_SCORE or any(self._same(person, p) for p in before):
             return None
         person = self._landmarks(frame.image, person.crop)  # again, with a better crop
-        if person.score < LEAST_SCORE or any(self._same(person, p) for p in found):
+        if person.score < LEAST_SCORE or any(self._same(person, p) for p in before):
             return None
-        return found, person
+        return before, person
 
     def _replace(self, frame: Frame, found: list[tuple[Followed, Person]], again: list[Person]) -> None:
         """Replace the first people's observations in a frame by better ones, and new people's colours."""
