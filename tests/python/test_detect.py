@@ -164,10 +164,11 @@ def test_a_new_person_is_known_by_colours_without_the_clothes_of_one_found_in_fr
     assert people._alike(one.colours, red) > 0.95 > people._alike(mixed, red)
 
 
-@pytest.mark.parametrize(("shift", "taken"), [(14.0, True), (60.0, False)])
-def test_a_person_found_again_beside_a_new_one_stays_on_the_course(stage, monkeypatch, shift, taken):
+@pytest.mark.parametrize(("first", "shift", "taken"), [(0, 14.0, True), (0, 60.0, False), (9, 60.0, True)])
+def test_a_person_found_again_beside_a_new_one_stays_on_the_course(stage, monkeypatch, first, shift, taken):
+    """If there is a course."""
     stage.detector = people.PeopleDetector(empty=np.zeros((200, 640, 3), np.uint8))
-    for n in range(10):
+    for n in range(first, 10):
         stage.step(n, red=200 + 4 * n)
     one = stage.detector.people[0]
     last = one.keypoints[-1]

@@ -46,7 +46,7 @@ class Overlaps:
 
     def __init__(self, empty: Image, landmarks: Callable[[Image, Crop], Person]) -> None:
         self._empty, self._landmarks = empty, landmarks
-        self._smooth = _smooth(empty)
+        self._smooth = cv2.blur(empty, (3, 3))
         self._image = empty
         self._foreground: Mask = np.zeros(empty.shape[:2], bool)
 
@@ -63,7 +63,8 @@ class Overlaps:
                 "the empty scene and the pictures differ in size; give a background of this camera"
             )
         self._image = image
-        self._foreground = np.abs(_smooth(image) - self._smooth).max(axis=2) > _LEAST_DIFFERENCE
+        blue, green, red = cv2.split(cv2.absdiff(cv2.blur(image, (3, 3)), self._smooth))
+        self._foreground = cv2.max(cv2.max(blue, green), red) > _LEAST_DIFFERENCE
 
     def find(self, crop: Crop, own: Array | None, others: Sequence[Array]) -> tuple[Person, Mask | None]:
         """Find the landmarks of the person in a crop, and where others hide them.
@@ -190,7 +191,3 @@ def foot(uv: Array) -> float:
 
 def _draw(canvas: Image, uv: Array, value: int) -> None:
     draw_person(canvas, dict(zip(LANDMARK_JOINTS, uv, strict=True)), value)
-
-
-def _smooth(image: Image) -> NDArray[np.int16]:
-    return np.asarray(cv2.blur(image, (3, 3)), np.int16)
