@@ -157,12 +157,32 @@ def test_an_empty_scene_of_another_size_is_refused():
         Overlaps(EMPTY, Network()).see(EMPTY[1:])
 
 
+def test_an_empty_scene_in_grey_is_refused():
+    with pytest.raises(UserError, match=r"must be a BGR picture \(h, w, 3\), not \(240, 320\)"):
+        Overlaps(EMPTY[..., 0], Network())
+
+
+def test_limbs_that_end_in_an_unknown_joint_are_not_drawn():
+    uv = joints(150.0)
+    uv[2] += 60, 0  # an elbow far to the left
+    names = list(LANDMARK_JOINTS)
+    assert names[2] == "l_elbow"
+    whole, at = area(uv), dict(zip(LANDMARK_JOINTS, uv, strict=True))
+    parts = []
+    for elbow in ({}, {"l_elbow": np.full(2, np.nan)}):
+        canvas = np.zeros((HEIGHT, WIDTH), np.uint8)
+        draw_person(canvas, {name: at[name] for name in names if name != "l_elbow"} | elbow, 1)
+        parts.append(canvas > 0)
+    assert (parts[0] == parts[1]).all() and whole[:, 200:].any() and not parts[0][:, 200:].any()
+
+
 @pytest.mark.parametrize(("shift", "known"), [(0, True), (9, False)])
-def test_a_camera_that_moves_has_no_empty_scene(shift, known):
+def test_a_camera_that_moves_has_no_empty_scene(shift, known, capsys):
     plate = np.random.default_rng(1).integers(0, 255, (HEIGHT // 8, WIDTH // 8, 3), np.uint8)
     plate = plate.repeat(8, axis=0).repeat(8, axis=1)
     samples = [Frame(n, n / 25, np.roll(plate, n * shift, axis=1)) for n in range(8)]
     camera = Camera(WIDTH, HEIGHT, 300.0, 300.0, 160.0, 120.0, np.eye(3), np.zeros(3))
     options = ClipOptions("v.mp4", "c.json", "t.csv", people=8)
     assert (static_plate(options, None, camera, samples, plate) is plate) == known
+    assert ("the camera moves: people who overlap" in capsys.readouterr().err) != known
     assert static_plate(options, None, camera, samples, None) is None

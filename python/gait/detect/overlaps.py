@@ -42,9 +42,16 @@ class Overlaps:
         The empty scene, BGR.
     landmarks : callable
         Finds the person in a crop of a picture, as `LandmarkNetwork` does.
+
+    Raises
+    ------
+    UserError
+        If the empty scene is not in colour.
     """
 
     def __init__(self, empty: Image, landmarks: Callable[[Image, Crop], Person]) -> None:
+        if empty.ndim != 3 or empty.shape[2] != 3:
+            raise UserError(f"the empty scene must be a BGR picture (h, w, 3), not {empty.shape}")
         self._empty, self._landmarks = empty, landmarks
         self._smooth = cv2.blur(empty, (3, 3))
         self._image = empty

@@ -9,7 +9,7 @@ from gait.detect import weights
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
-from gait.progress import warning
+from gait.progress import note, warning
 from gait.track.from_walk import Calibration
 from gait.track.options import ClipOptions
 from gait.track.stabilise import (
@@ -92,11 +92,14 @@ def camera_motion(
 def static_plate(
     options: ClipOptions, video: Video, camera: Camera | None, samples: list[Frame], plate: Image | None
 ) -> Image | None:
-    """Return the empty scene if the camera stands still in the samples, and otherwise None."""
+    """Return the empty scene if the camera stands still in the samples; otherwise None, and print a note."""
     if plate is None or not samples:
         return plate
     lens = camera or expected_lens(video, options.fov, samples, {})
-    return None if moves(lens, samples, {}, plate) else plate
+    if not moves(lens, samples, {}, plate):
+        return plate
+    note("the camera moves: people who overlap are not found one by one", options.quiet)
+    return None
 
 
 def motion_remedy(options: ClipOptions, turn: float | None) -> str:
