@@ -1,8 +1,8 @@
 """Track several people in a clip, each with a separate tracker.
 
 The detector identifies people, even when they cross.  Each person is tracked as if alone, except that the
-others' keypoints are left out, and that the silhouette is not compared where others are nearer
-(`gait.track.other_people`).
+others' keypoints are left out, that the silhouette is not compared where others are nearer
+(`gait.track.other_people`), and that the track starts in the best second, as others may hide the person.
 """
 
 from __future__ import annotations
