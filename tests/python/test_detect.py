@@ -22,7 +22,7 @@ class Stage:
     """People as rectangles of colour, and the two networks that see them exactly."""
 
     def __init__(self, monkeypatch):
-        self.places = {}
+        self.places, self.reach = {}, 60
         monkeypatch.setattr(
             people,
             "PersonNetwork",
@@ -41,27 +41,29 @@ class Stage:
         return Crop(np.array([place, 100.0]), 200.0, 0.0)
 
     def landmarks(self, image, crop):
-        """See the person nearest to the middle of a crop."""
-        near = min(
-            self.visible(),
-            key=lambda place: abs(place - crop.centre[0]),
-            default=np.inf,
-        )
-        if abs(near - crop.centre[0]) > 60:
-            return Person(0.1, np.zeros((16, 2)), np.zeros(16), crop)
-        return self.person(near)
+        """See the person of whom most is in the picture near the middle of a crop."""
+        best, most = None, 0.0
+        for nearer, (place, own) in enumerate(self.drawn):
+            part = float((image[own] > 0).any(axis=1).sum() / self.area)
+            off = abs(place - crop.centre[0])
+            if part > 0.3 and off <= self.reach and part - off / 120 > most:
+                best, most = self.person(place, nearer), part - off / 120
+        return best or Person(0.1, np.zeros((16, 2)), np.zeros(16), crop)
 
-    def person(self, place):
+    def person(self, place, nearer=0.0):
+        """Someone at a place, whose feet are lower in the picture by some pixels."""
         x = place + 15.0 * np.array([1, -1] * 8)
         y = np.array([60, 60, 75, 75, 90, 90, 110, 110, 140, 140, 170, 170, 172, 172, 174, 174.0])
-        return Person(0.9, np.column_stack([x, y]), np.ones(16), self.crop(place))
+        return Person(0.9, np.column_stack([x, y + nearer]), np.ones(16), self.crop(place))
 
     def step(self, number, **places):
         self.places = places
-        image = np.zeros((200, 640, 3), np.uint8)
-        for name, place in places.items():
-            image[50:180, max(int(place) - 20, 0) : int(place) + 20] = RED if name.startswith("red") else BLUE
-        self.image = image
+        image, nearest = np.zeros((200, 640, 3), np.uint8), np.full((200, 640), -1, np.int8)
+        for k, (name, place) in enumerate(places.items()):
+            at = slice(50, 180), slice(max(int(place) - 20, 0), int(place) + 20)
+            image[at], nearest[at] = RED if name.startswith("red") else BLUE, k
+        self.image, self.area = image, 40 * 130
+        self.drawn = [(place, nearest == k) for k, place in enumerate(places.values())]
         found = self.detector.step(Frame(number, number / 25, image))
         return {one.id: float(person.uv[:, 0].mean()) for one, person in found}
 
@@ -142,21 +144,17 @@ def test_one_in_front_of_another_is_told_by_the_course_and_near_a_lost_one_by_th
     assert stage.detector._strange(one, frame, person, [other], None)
 
 
-def lowered(person, by):
-    return person._replace(uv=person.uv + (0.0, by))
-
-
 def test_a_new_person_is_known_by_colours_without_the_clothes_of_one_found_in_front(stage, monkeypatch):
     stage.detector = people.PeopleDetector(empty=np.zeros((200, 640, 3), np.uint8))
     stage.step(0, red=200, blue=220)
     frame = Frame(1, 0.04, stage.image)
-    behind, front = stage.person(200), lowered(stage.person(220), 1.0)
+    behind, front = stage.person(200), stage.person(220, 1.0)
     one = people.Followed(3)
     stage.detector._add(one, frame, behind, [], None)
     mixed = one.colours
     found = [(one, behind)]
     monkeypatch.setattr(
-        stage.detector._overlaps, "find_one_more", lambda found, crop: ([lowered(behind, 0.5)], front)
+        stage.detector._overlaps, "find_one_more", lambda found, crop: ([stage.person(200, 0.5)], front)
     )
     assert stage.detector._add_new(frame, found, [front.crop])
     stage.step(2, red=200)
@@ -187,6 +185,26 @@ def test_one_whose_trunk_is_hidden_gets_an_old_id_only_soon_after(stage, seconds
     one.lost = True
     frame = frame._replace(time=one.times[-1] + seconds)
     assert (stage.detector._who(frame, person, np.ones((200, 640), bool)) is one) == same
+
+
+def test_the_course_of_someone_near_another_goes_on_while_most_of_them_is_in_view(stage):
+    stage.detector = people.PeopleDetector(empty=np.zeros((200, 640, 3), np.uint8))
+    for n in range(10):
+        stage.step(n, red=200 + 2 * n, blue=500)
+    one, other = stage.detector.people
+    for shift, free in ((20, 9), (40, 11)):  # a third and two thirds of them in view
+        person = stage.person(218)
+        hidden = stage.detector._overlaps.hidden(person.uv, [person.uv + (shift, 1)])
+        stage.detector._add(one, Frame(10, 0.4, stage.image), person, [other], hidden)
+        assert one.free == free
+
+
+def test_three_people_whose_boxes_are_one_are_found_from_the_nearest_on(stage):
+    stage.detector = people.PeopleDetector(everyone=True, empty=np.zeros((200, 640, 3), np.uint8))
+    stage.detector._find = lambda image, small: iter([[stage.crop(300)]])
+    stage.reach = 35
+    found = stage.step(0, red=275, green=325, blue=300)
+    assert sorted(found.values()) == [pytest.approx(275), pytest.approx(300), pytest.approx(325)]
 
 
 def test_one_who_walks_on_behind_a_wall_has_the_old_id(stage):

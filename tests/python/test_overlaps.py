@@ -91,6 +91,15 @@ def test_someone_who_is_hidden_is_not_found():
     assert one.find(crop_of(hardly), hardly, [NEAR])[0].score == 0
 
 
+@pytest.mark.parametrize(("u", "found"), [(170.0, False), (175.0, True)])
+def test_someone_of_whom_only_an_edge_is_in_view_is_not_found(u, found):
+    """All of what is in view is foreground: a seventh, or a third, of them."""
+    behind = joints(u, 199.0)
+    one, _ = overlaps((behind, 200), (NEAR, 30))
+    one._landmarks = lambda image, crop: person(behind)
+    assert (one.find(crop_of(behind), behind, [NEAR])[0].score > 0) == found
+
+
 def test_landmarks_in_the_empty_scene_are_no_person():
     one, network = overlaps((NEAR, 30))
     one._landmarks = lambda image, crop: person(joints(60.0))
@@ -126,8 +135,19 @@ def test_no_one_is_added_to_one_person():
     one, network = overlaps((NEAR, 30))
     alone = network(picture((NEAR, 30)), crop_of(NEAR))
     assert one.find_one_more([alone], crop_of(joints(140.0))) is None
-    one._remains = lambda people, crop: True  # even if something remains
-    assert one.find_one_more([alone], crop_of(joints(140.0))) is None
+
+
+@pytest.mark.parametrize(("width", "found"), [(6, False), (40, True)])
+def test_a_thing_beside_a_person_is_no_other_person(width, found):
+    """A network that sees someone in it; they must add a third of a person to the foreground."""
+    image = picture((NEAR, 30))
+    part = image[60:200, 185 : 185 + width]
+    part[part == 90] = 200
+    beside = joints(181.0, 199.0)
+    one = Overlaps(EMPTY, lambda image, crop: person(NEAR if crop.centre[0] < 173 else beside))
+    one.see(image)
+    one._remains = lambda people, crop: True
+    assert (one.find_one_more([person(NEAR)], crop_of(beside)) is not None) == found
 
 
 @pytest.mark.parametrize(
