@@ -41,7 +41,7 @@ class Stage:
         return Crop(np.array([place, 100.0]), 200.0, 0.0)
 
     def landmarks(self, image, crop):
-        """See the person of whom most is in the picture near the middle of a crop."""
+        """See the person who shows most in the picture, and is near the middle of a crop."""
         best, most = None, 0.0
         for nearer, (place, own) in enumerate(self.drawn):
             part = float((image[own] > 0).any(axis=1).sum() / self.area)
@@ -113,7 +113,7 @@ def test_people_who_overlap_from_the_first_frame_are_both_followed(stage):
         ]
 
 
-def seen(stage, number, **places):
+def followed(stage, number, **places):
     """Two people followed through a frame, the second beside the first; the frame, and what was found."""
     stage.step(number, **places)
     one, other = stage.detector.people
@@ -122,7 +122,7 @@ def seen(stage, number, **places):
 
 
 def test_a_neighbour_of_unknown_colours_makes_no_one_strange(stage):
-    one, other, frame, person = seen(stage, 0, red=200, blue=260)
+    one, other, frame, person = followed(stage, 0, red=200, blue=260)
     other.colours = None
     one.colours = 0.6 * one.colours + 0.4 * people._colours(frame.image, other.keypoints[-1], None)  # of both
     assert not stage.detector._strange(one, frame, person, [other], None)
@@ -130,11 +130,11 @@ def test_a_neighbour_of_unknown_colours_makes_no_one_strange(stage):
     assert stage.detector._strange(one, frame, person, [other], None)
 
 
-def test_one_in_front_of_another_is_told_by_the_course_and_near_a_lost_one_by_the_colours(stage):
+def test_colours_distinguish_a_person_from_a_lost_one_but_not_from_one_behind(stage):
     """With someone in front, who is in view, colours of the other on the trunk do not matter."""
     empty = np.zeros((200, 640, 3), np.uint8)
     stage.detector = people.PeopleDetector(everyone=True, empty=empty)
-    one, other, frame, person = seen(stage, 0, red=200, blue=260)
+    one, other, frame, person = followed(stage, 0, red=200, blue=260)
     one.colours, other.colours = other.colours, one.colours  # the trunk shows the other's
     hidden = stage.detector._overlaps.hidden
     front = hidden(person.uv, [person.uv + (30, -1)])
@@ -181,7 +181,7 @@ def test_a_person_found_again_beside_a_new_one_stays_on_the_course(stage, monkey
 
 @pytest.mark.parametrize(("seconds", "same"), [(1.0, True), (50.0, False)])
 def test_one_whose_trunk_is_hidden_gets_an_old_id_only_soon_after(stage, seconds, same):
-    one, other, frame, person = seen(stage, 0, red=200, blue=500)
+    one, other, frame, person = followed(stage, 0, red=200, blue=500)
     one.lost = True
     frame = frame._replace(time=one.times[-1] + seconds)
     assert (stage.detector._who(frame, person, np.ones((200, 640), bool)) is one) == same

@@ -92,7 +92,7 @@ def test_someone_who_is_hidden_is_not_found():
 
 
 @pytest.mark.parametrize(("u", "found"), [(170.0, False), (175.0, True)])
-def test_someone_of_whom_only_an_edge_is_in_view_is_not_found(u, found):
+def test_someone_with_only_an_edge_in_view_is_not_found(u, found):
     """All of what is in view is foreground: a seventh, or a third, of them."""
     behind = joints(u, 199.0)
     one, _ = overlaps((behind, 200), (NEAR, 30))
@@ -161,7 +161,7 @@ def test_someone_new_needs_foreground_in_the_part_of_a_crop_that_is_in_the_pictu
     assert one._remains([], Crop(np.array([u, 120.0]), 200.0, 0.0)) == enough
 
 
-def test_someone_whom_the_empty_scene_shows_is_found_if_no_one_else_is_near():
+def test_someone_in_the_empty_scene_is_found_if_no_one_else_is_near():
     stands, near, away = joints(262.0), joints(220.0), joints(58.0)
     for walks, found in ((away, True), (near, False)):
         one = Overlaps(picture((stands, 30)), Network())

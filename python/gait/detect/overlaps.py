@@ -114,7 +114,7 @@ class Overlaps:
         if people and not self._remains(joints, crop):
             if any(overlap(one.crop, crop) for one in people):
                 return None
-            joints = []  # perhaps someone whom the empty scene shows, and whom no one hides
+            joints = []  # perhaps someone who is in the empty scene, and not hidden
         new, _ = self.find(crop, None, joints)
         if new.score < LEAST_SCORE:
             return None
