@@ -142,6 +142,9 @@ def test_colours_distinguish_a_person_from_a_lost_one_but_not_from_one_behind(st
     assert stage.detector._strange(one, frame, person, [other], hidden(person.uv, [person.uv + (30, 1)]))
     other.lost = True
     assert stage.detector._strange(one, frame, person, [other], None)
+    own = people._colours(frame.image, person, None)
+    one.colours, other.colours = 0.5 * (one.colours + own), own  # in sun and shade, and in similar clothes
+    assert not stage.detector._strange(one, frame, person, [other], None)
 
 
 def test_a_new_person_is_known_by_colours_without_the_clothes_of_one_found_in_front(stage, monkeypatch):

@@ -317,6 +317,8 @@ class PeopleDetector:
             return off  # someone who comes out from behind may show on the trunk
         colours = _colours(frame.image, person, hidden)
         own = _alike(colours, one.colours)
+        if near and self._overlaps is not None and hidden is None and own >= _COLOUR_OVERLAP:
+            return off  # the others near are lost, and their clothes may be similar
         if near:
             known = [other.colours for other in near if other.colours is not None]
             return off or any(_alike(colours, other) > own + _CLEAR_OVERLAP_GAIN for other in known)
