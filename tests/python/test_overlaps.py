@@ -6,7 +6,7 @@ import pytest
 from gait.camera.camera import Camera
 from gait.detect.networks import LANDMARK_JOINTS, Crop, Person
 from gait.detect.outline import draw_person
-from gait.detect.overlaps import Overlaps, foot, same_joints
+from gait.detect.overlaps import Overlaps, same_joints
 from gait.errors import UserError
 from gait.io.video import Frame
 from gait.track.clip_camera import static_plate
@@ -25,7 +25,7 @@ def joints(u, lowest=200.0):
 
 
 def crop_of(uv):
-    return Crop(np.array([uv[:, 0].mean(), foot(uv) - 70]), 200.0, 0.0)
+    return Crop(np.array([uv[:, 0].mean(), uv[:, 1].max() - 70]), 200.0, 0.0)
 
 
 def person(uv, score=0.9):
@@ -79,6 +79,12 @@ def test_others_are_replaced_by_the_empty_scene_where_they_are_nearer():
     assert (network.picture[area(NEAR)] == 30).all() and not (network.picture == 200).any()
 
 
+def test_of_two_at_the_same_depth_one_hides_the_other():
+    one, _ = overlaps()
+    left, right = joints(150.0), joints(165.0)
+    assert one.hidden(left, [right]).any() != (one.hidden(right, [left]) & area(right)).any()
+
+
 def test_without_others_the_picture_is_left_as_it_is():
     one, network = overlaps((FAR, 200))
     _, hidden = one.find(crop_of(FAR), FAR, [])
@@ -87,7 +93,8 @@ def test_without_others_the_picture_is_left_as_it_is():
 
 def test_someone_who_is_hidden_is_not_found():
     hardly = joints(166.0, 199.0)
-    one, _ = overlaps((hardly, 200), (NEAR, 30))
+    one, network = overlaps((hardly, 200), (NEAR, 30))
+    one._landmarks = lambda image, crop: person(network(image, crop).uv - (0.0, 1.0))
     assert one.find(crop_of(hardly), hardly, [NEAR])[0].score == 0
 
 

@@ -121,7 +121,7 @@ class Overlaps:
         near = [k for k, one in enumerate(people) if overlap(one.crop, new.crop)]
         found = [*(people[k] for k in near), new]
         for _ in range(_ROUNDS if near else 1):
-            for k in sorted(range(len(found)), key=lambda k: foot(found[k].uv), reverse=True):
+            for k in sorted(range(len(found)), key=lambda k: nearness(found[k].uv), reverse=True):
                 others = [one.uv for j, one in enumerate(found) if j != k]
                 found[k], _ = self.find(found[k].crop, found[k].uv, others)
                 if found[k].score < LEAST_SCORE:
@@ -145,12 +145,12 @@ class Overlaps:
         On level ground nearer feet are lower in the picture.
         """
         canvas = np.zeros(self._foreground.shape, np.uint8)
-        behind = [] if own is None else [uv for uv in others if foot(uv) < foot(own)]
+        behind = [] if own is None else [uv for uv in others if nearness(uv) < nearness(own)]
         for uv in behind:
             _draw(canvas, uv, 1)
         if own is not None:
             _draw(canvas, own, 0)
-        for uv in others if own is None else [uv for uv in others if foot(uv) >= foot(own)]:
+        for uv in others if own is None else [uv for uv in others if nearness(uv) >= nearness(own)]:
             _draw(canvas, uv, 1)
         return canvas > 0
 
@@ -191,9 +191,9 @@ def distinct(people: Sequence[Person]) -> bool:
     return not any(same_joints(a, b) for a, b in combinations(people, 2))
 
 
-def foot(uv: Array) -> float:
-    """Row of the lowest joint of a person (16, 2)."""
-    return float(uv[:, 1].max())
+def nearness(uv: Array) -> tuple[float, float]:
+    """Row of the lowest joint of a person (16, 2), then the mean column, which decides between equal rows."""
+    return float(uv[:, 1].max()), float(uv[:, 0].mean())
 
 
 def _draw(canvas: Image, uv: Array, value: int) -> None:

@@ -34,7 +34,7 @@ from gait.detect.networks import (
     PersonNetwork,
     whole_picture,
 )
-from gait.detect.overlaps import Mask, Overlaps, distinct, foot, overlap, same_joints
+from gait.detect.overlaps import Mask, Overlaps, distinct, nearness, overlap, same_joints
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
@@ -268,7 +268,7 @@ class PeopleDetector:
             return [(one, self._landmarks(frame.image, crops[one.id]), None) for one in followed]
         joints = {one.id: one.joints_in(crops[one.id]) for one in followed}
         located = []
-        for one in sorted(followed, key=lambda one: foot(joints[one.id]), reverse=True):
+        for one in sorted(followed, key=lambda one: nearness(joints[one.id]), reverse=True):
             beside = [
                 joints[other.id]
                 for other in followed
