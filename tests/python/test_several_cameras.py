@@ -113,7 +113,7 @@ def test_the_offset_is_from_more_frames_than_are_tracked(stage, tmp_path, monkey
             for _ in range(90):
                 writer.write(np.full((480, 640, 3), 90, np.uint8))
 
-    def detected(options, video, frames):
+    def detected(options, video, frames, empty):
         found = keypoints(stage, cameras[str(options.video)], range(90))
         return {4: found.part(slice(frames.start, frames.stop))}, 4
 
@@ -399,7 +399,7 @@ def test_joints_are_measured_as_well_before_a_film_ends(smooth, tmp_path, monkey
         for frame in Video("video_2.mp4").frames(0, half):
             writer.write(frame.image)
 
-    def detected(options, video, frames):
+    def detected(options, video, frames, empty):
         camera, random = read_camera(options.camera), np.random.default_rng(1)
         uv = np.stack([camera.project(truth.places[name][list(frames)]) for name in names], axis=1)
         uv = uv + 0.3 * random.standard_normal(uv.shape)
