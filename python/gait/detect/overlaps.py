@@ -89,14 +89,16 @@ class Overlaps:
         if not others:
             return self._landmarks(self._image, crop), None
         hidden = self.hidden(own, others)
-        picture = np.where(hidden[..., None], self._empty, self._image)
+        picture = self._image.copy()
+        cv2.copyTo(self._empty, hidden.view(np.uint8), picture)
         person = self._landmarks(picture, crop)
         if own is not None:
             hidden = self.hidden(person.uv, others)
         area = self._area([person.uv])
         visible = area & ~hidden
-        foreground = int((visible & self._foreground).sum())
-        if visible.sum() < _LEAST_PART * area.sum() or foreground < _LEAST_FOREGROUND * visible.sum():
+        shown = np.count_nonzero(visible)
+        foreground = np.count_nonzero(visible & self._foreground)
+        if shown < _LEAST_PART * np.count_nonzero(area) or foreground < _LEAST_FOREGROUND * shown:
             person = person._replace(score=0.0)
         return person, hidden
 
