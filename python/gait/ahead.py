@@ -1,14 +1,42 @@
-"""Read ahead: another thread produces what is needed next."""
+"""Queues between two threads; and reading ahead, where another thread produces what is needed next."""
 
 from __future__ import annotations
 
-import queue
 import threading
 from collections.abc import Callable, Generator, Iterable
-from typing import TypeVar
+from queue import SimpleQueue
+from typing import Generic, TypeVar
 
 T = TypeVar("T")
-_TURN = 0.1  # seconds between attempts to append to a full queue
+
+
+class BoundedQueue(Generic[T]):
+    """A queue in which at most `limit` items wait.
+
+    An interrupt (KeyboardInterrupt) in the middle of a call leaves it usable.  That of the standard library,
+    which is written in Python, may stay locked.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._items: SimpleQueue[T] = SimpleQueue()
+        self._places: SimpleQueue[None] = SimpleQueue()
+        for _ in range(limit):
+            self._places.put(None)
+
+    def put(self, item: T) -> None:
+        """Append an item; wait while the queue is full."""
+        self._places.get()
+        self._items.put(item)
+
+    def get(self) -> T:
+        """Remove and return the first item; wait while there is none."""
+        item = self._items.get()
+        self._places.put(None)
+        return item
+
+    def widen(self) -> None:
+        """Let one item more wait."""
+        self._places.put(None)
 
 
 class _End:
@@ -28,27 +56,19 @@ def ahead(
 
     The end waits for the item that is being read; `stop` is called first, for a source that may wait long.
     """
-    waiting: queue.Queue[T | _End] = queue.Queue(limit)
+    waiting: BoundedQueue[T | _End] = BoundedQueue(limit)
     left = threading.Event()
-
-    def put(item: T | _End) -> bool:
-        while not left.is_set():
-            try:
-                waiting.put(item, timeout=_TURN)
-            except queue.Full:
-                continue
-            return True
-        return False
 
     def work() -> None:
         reason: BaseException | None = None
         try:
             for item in source:
-                if not put(item):
+                waiting.put(item)
+                if left.is_set():
                     return
         except BaseException as exc:  # to be raised in the consumer's thread
             reason = exc
-        put(_End(reason))
+        waiting.put(_End(reason))
 
     thread = threading.Thread(target=work, name="ahead", daemon=True)
     thread.start()
@@ -59,5 +79,7 @@ def ahead(
             raise item.reason
     finally:
         left.set()
+        waiting.widen()  # the thread may wait for a place, now or at its end
+        waiting.widen()
         stop()
         thread.join()

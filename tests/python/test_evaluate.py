@@ -35,7 +35,14 @@ from gait.motion.evaluate import (
     stature,
     trust,
 )
-from gait.motion.footfalls import Strikes, strikes_by_zeni, strikes_from_meta, strikes_of, walking_direction
+from gait.motion.footfalls import (
+    Strikes,
+    meta_of,
+    strikes_by_zeni,
+    strikes_from_meta,
+    strikes_of,
+    walking_direction,
+)
 
 SECTIONS = blob.decode(read_blob(None))
 RATE, FIRST_PHASE, HEIGHT = 0.9, 0.3, 1.7
@@ -257,6 +264,13 @@ def test_only_common_frames_count():
     assert measures["free"]["abs"]["p90"] < 5  # it starts at the first common frame
     with pytest.raises(UserError, match="frames 500-599 and the truth's 0-99 have none in common"):
         evaluate(track(frame=TRUTH.frame + 500), TRUTH, strikes=STRIKES, model=SECTIONS)
+
+
+@pytest.mark.parametrize(
+    ("truth", "meta"), [("truth.csv", "meta.json"), ("truth_2.csv", "meta_2.json"), ("mine.csv", "meta.json")]
+)
+def test_each_person_has_a_meta_file(tmp_path, truth, meta):
+    assert meta_of(tmp_path / truth) == tmp_path / meta
 
 
 def test_strikes_of_a_meta_file(tmp_path):

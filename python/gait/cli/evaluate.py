@@ -9,8 +9,8 @@ Prints, over the frames in both files, with an explanation of each line:
   the pose error of two baselines without images: the mean pose at the true position, and the mean stride
   continued from the true start.
 
-Heel strikes come from meta.json beside the truth, or else from the truth, where a heel is furthest in front
-of the pelvis.
+Heel strikes come from meta.json beside the truth (meta_2.json beside truth_2.csv), or else from the truth,
+where a heel is furthest in front of the pelvis.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from gait.camera.camera import Camera
     from gait.io.track_file import read_estimates, read_truth
     from gait.motion.evaluate import evaluate
-    from gait.motion.footfalls import strikes_of
+    from gait.motion.footfalls import meta_of, strikes_of
     from gait.report.error_table import OTHER_WORLD, as_text
 
     if os.path.realpath(args.track) == os.path.realpath(args.truth):
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     measures = evaluate(
         track,
         truth,
-        strikes=strikes_of(truth, beside / "meta.json"),
+        strikes=strikes_of(truth, meta_of(args.truth)),
         model=read_cyclic(args.model),
         camera=Camera.read(str(camera)) if camera else None,
     )

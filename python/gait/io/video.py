@@ -12,7 +12,6 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
 from pathlib import Path
-from queue import Queue
 from threading import Thread
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.ahead import BoundedQueue
 from gait.errors import UserError
 from gait.io.files import replacing, require_file
 
@@ -284,7 +284,7 @@ class VideoWriter:
         self._stack = ExitStack()
         self._stream: av.VideoStream | None = None
         self._size: tuple[int, int] | None = None
-        self._waiting: Queue[Image | None] = Queue(_WAITING)
+        self._waiting: BoundedQueue[Image | None] = BoundedQueue(_WAITING)
         self._thread = Thread(target=self._encode_all, daemon=True)
         self._fault: Exception | None = None
         self._finished = False
@@ -302,6 +302,7 @@ class VideoWriter:
     def __exit__(
         self, kind: type[BaseException] | None, exc: BaseException | None, trace: TracebackType | None
     ) -> bool | None:
+        self._waiting.widen()  # an interrupt may have taken a place
         self._waiting.put(None)
         self._thread.join()
         if self._fault is None or kind is not None:

@@ -68,6 +68,12 @@ class Strikes:
         return at[order], first + 0.5 * np.arange(len(at), dtype=float)
 
 
+def meta_of(truth: str | os.PathLike[str]) -> Path:
+    """Return the path of the meta.json of a file of true joints: meta_2.json of truth_2.csv."""
+    number = Path(truth).stem.removeprefix("truth")
+    return Path(truth).with_name(f"meta{number}.json" if number.startswith("_") else "meta.json")
+
+
 def strikes_of(truth: Joints, meta: Path) -> Strikes:
     """Return the strikes listed in the file `meta`, or, if it is missing or has none, those in the truth."""
     known = strikes_from_meta(meta) if meta.is_file() else None

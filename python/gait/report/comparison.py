@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +12,7 @@ from gait.bindings.model import read_cyclic
 from gait.camera.camera import Camera
 from gait.io.track_file import Joints, Track, read_truth
 from gait.motion.evaluate import Measures, evaluate, root_errors
-from gait.motion.footfalls import Strikes, strikes_of
+from gait.motion.footfalls import Strikes, meta_of, strikes_of
 from gait.report.colours import BLUE, GREY, ORANGE
 from gait.report.error_table import ERROR_HEADER, OTHER_WORLD, error_rows, share_rows
 from gait.report.gait_parts import time_span, tint
@@ -52,7 +51,7 @@ class Comparison:
 def compare(track: Track, truth: str, model: str | None, camera: Camera | None) -> Comparison:
     """Compare a track with the file of the true motion; `model` and `camera` as for `evaluate`."""
     true = read_truth(truth)
-    strikes = strikes_of(true, Path(truth).parent / "meta.json")
+    strikes = strikes_of(true, meta_of(truth))
     measures = evaluate(track, true, strikes=strikes, model=read_cyclic(model), camera=camera)
     return _by_frame(measures, track, true, strikes)
 
