@@ -232,10 +232,10 @@ gait_result snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
     if (memcmp(h.magic, MAGIC, sizeof MAGIC) != 0)
         return base_fail(err, GAIT_ERR_MAGIC, -1, "these bytes are not a tracker snapshot");
     if (h.format != FORMAT || h.abi != GAIT_ABI || h.version != GAIT_VERSION)
-        return base_fail(err, GAIT_ERR_VERSION, -1,
-                         "snapshot of format %u by library version %u, ABI %u; this is format %u, version %u, ABI %u",
-                         h.format, h.version, h.abi, (unsigned)FORMAT, (unsigned)GAIT_VERSION,
-                         (unsigned)GAIT_ABI);
+        return base_fail(
+            err, GAIT_ERR_VERSION, -1,
+            "snapshot of format %u by library version %u, ABI %u; this is format %u, version %u, ABI %u",
+            h.format, h.version, h.abi, (unsigned)FORMAT, (unsigned)GAIT_VERSION, (unsigned)GAIT_ABI);
     if (h.model != t->model->digest || h.config != config_digest(t))
         return base_fail(err, GAIT_ERR_VERSION, -1,
                          "snapshot of a tracker with another model or configuration");
