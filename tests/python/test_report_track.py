@@ -12,11 +12,12 @@ from test_parameters import drawn
 from walking_track import walking_track, write_track
 
 from gait.cli import main
+from gait.motion.footfalls import Events
 from gait.motion.parameters import PARAMETER_LABELS, measure
 from gait.motion.verdict import verdict_of
 from gait.report.colours import BLUE, ORANGE
 from gait.report.drawing import side_colour
-from gait.report.gait_parts import footfall_plot
+from gait.report.gait_parts import floor_contacts, footfall_plot
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +96,20 @@ def test_left_is_blue_and_right_orange_as_in_pictures():
     assert blue > red
     blue, _, red = side_colour("r_knee")
     assert blue < red
+
+
+def test_a_foot_is_on_the_floor_until_it_leaves_it_however_long_the_person_stands():
+    """It stands at first, then for two seconds; one toe-off is unknown; it stands at the end."""
+    track = walking_track()
+    events = Events(
+        {"right": np.array([0.5, 1.5, 4.0, 4.4]), "left": np.array([])},
+        {"right": np.array([0.2, 1.1, 3.6]), "left": np.array([0.7])},
+    )
+    first, last = track.time[[0, -1]]
+    begin, until = floor_contacts(track, events, "right")
+    assert begin.tolist() == [first, 0.5, 1.5, 4.0, 4.4] and until.tolist() == [0.2, 1.1, 3.6, 4.4, last]
+    begin, until = floor_contacts(track, events, "left")
+    assert begin.tolist() == [first] and until.tolist() == [0.7]
 
 
 def test_draws_are_used_where_given(folder, capsys):

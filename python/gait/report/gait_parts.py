@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from gait.io.track_file import Track
-from gait.motion.footfalls import STRIKE_SIDES, contacts, stride_time
+from gait.motion.footfalls import STRIKE_SIDES, Events
 from gait.motion.norms import Compared
 from gait.motion.parameters import PARAMETER_LABELS, PERCENT, AngleCycle, Parameters
 from gait.report import terms
@@ -17,6 +18,8 @@ from gait.report.colours import DARK, GREY, ON_PAPER, STATUS_TINTS
 from gait.report.film import runs
 from gait.report.page import Page
 from gait.report.plots import Painter, for_screen_and_telephone, panels, time_plot
+
+Array = NDArray[np.float64]
 
 _GROUPS = {
     "Pelvis and trunk": ("root_pitch", "root_roll", "root_yaw", "torso_y", "torso_x", "torso_z"),
@@ -117,18 +120,26 @@ def _meaning(names: list[str]) -> str:
     return f'<details class="terms"><summary>What the quantities mean</summary><dl>{items}</dl></details>'
 
 
+def floor_contacts(track: Track, events: Events, side: str) -> tuple[Array, Array]:
+    """Return when a foot came to the floor and left it, (n,) each, seconds.
+
+    A contact lasts until the next toe-off, however long the person stands, but not beyond the next strike.
+    """
+    strike, off = events.strike[side], events.off[side]
+    on_floor_first = len(off) > 0 and (not len(strike) or off[0] < strike[0])
+    begin = np.append(track.time[0], strike) if on_floor_first else strike
+    latest = np.append(begin[1:], track.time[-1])
+    after = np.append(off, np.inf)[np.searchsorted(off, begin, side="right")]
+    return begin, np.minimum(after, latest)
+
+
 def footfall_plot(track: Track, parameters: Parameters) -> str:
     """Draw the contacts of both feet over time; ticks: strikes and toe-offs with two standard deviations."""
-    stride = stride_time(parameters.events)
 
     def paint(axes: Axes) -> None:
         tint(axes, track)
         for row, side in enumerate(STRIKE_SIDES):
-            foot = contacts(track, parameters.events, side, stride)
-            begin, ends = foot.strike, np.where(np.isfinite(foot.off), foot.off, track.time[-1])
-            first = parameters.events.off[side][:1]
-            if len(first) and (not len(begin) or first[0] < begin[0]):  # on the ground at the start
-                begin, ends = np.append(track.time[0], begin), np.append(first, ends)
+            begin, ends = floor_contacts(track, parameters.events, side)
             axes.barh(np.full(len(ends), row), ends - begin, left=begin, height=0.5, color=ON_PAPER[side])
             for times, sds, bottom in (
                 (parameters.events.strike[side], parameters.event_sd.strike[side], 0.32),
