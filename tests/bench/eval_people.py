@@ -139,25 +139,9 @@ def measured(scenario: Scenario) -> tuple[list[list[object]], bool, float]:
         lost = own[k].status.count("lost") if k in own else None
         kind = f"{scenario.people}, {scenario.view}"
         stray_here = stray if k == 1 else 0
-        rows.append(
-            [
-                kind,
-                scenario.seed,
-                k,
-                among,
-                alone,
-                among / alone,
-                lost,
-                int(switched),
-                stray_here,
-            ]
-        )
+        rows.append([kind, scenario.seed, k, among, alone, among / alone, lost, int(switched), stray_here])
         print(*rows[-1], file=sys.stderr, flush=True)
-    return (
-        rows,
-        scenario.people == "crossing" and not switched and len(own) == count,
-        cost,
-    )
+    return rows, scenario.people == "crossing" and not switched and len(own) == count, cost
 
 
 def made(scenario: Scenario) -> Path:
@@ -183,12 +167,7 @@ def options_of(folder: Path, video: str, output: str, people: int | None = None)
     """Options of a track: all that is known of a clip except who is in it."""
     camera, background = str(folder / "camera.json"), str(folder / "background.png")
     return ClipOptions(
-        str(folder / video),
-        camera,
-        str(folder / output),
-        background=background,
-        people=people,
-        quiet=True,
+        str(folder / video), camera, str(folder / output), background=background, people=people, quiet=True
     )
 
 

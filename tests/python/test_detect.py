@@ -24,9 +24,7 @@ class Stage:
     def __init__(self, monkeypatch):
         self.places, self.reach = {}, 60
         monkeypatch.setattr(
-            people,
-            "PersonNetwork",
-            lambda: lambda image, small: [list(map(self.crop, self.visible()))],
+            people, "PersonNetwork", lambda: lambda image, small: [list(map(self.crop, self.visible()))]
         )
         monkeypatch.setattr(people, "LandmarkNetwork", lambda name: self.landmarks)
         self.detector = people.PeopleDetector()
@@ -96,10 +94,7 @@ def test_someone_who_comes_out_from_behind_another_is_found_at_once(stage, other
         found = stage.step(n, red=80 + 8 * n, **{other: 560 - 8 * n})
         apart = abs(480 - 16 * n)
         if apart > 60:
-            assert found == {
-                1: pytest.approx(80 + 8 * n),
-                2: pytest.approx(560 - 8 * n),
-            }
+            assert found == {1: pytest.approx(80 + 8 * n), 2: pytest.approx(560 - 8 * n)}
 
 
 def test_people_who_overlap_from_the_first_frame_are_both_followed(stage):
@@ -107,10 +102,7 @@ def test_people_who_overlap_from_the_first_frame_are_both_followed(stage):
     stage.detector = people.PeopleDetector(everyone=True, empty=np.zeros((200, 640, 3), np.uint8))
     for n in range(40):
         found = stage.step(n, red=100 + 5 * n, blue=140 + 6 * n)
-        assert sorted(found.values()) == [
-            pytest.approx(100 + 5 * n),
-            pytest.approx(140 + 6 * n),
-        ]
+        assert sorted(found.values()) == [pytest.approx(100 + 5 * n), pytest.approx(140 + 6 * n)]
 
 
 def followed(stage, number, **places):
@@ -299,11 +291,7 @@ def test_the_main_person_is_in_view_long_and_large():
         uv = np.zeros((frames, 16, 2))
         uv[:, 14:, 1] = height
         return Keypoints(
-            np.arange(frames),
-            np.arange(frames) / 25,
-            tuple(LANDMARK_JOINTS),
-            uv,
-            np.ones((frames, 16)),
+            np.arange(frames), np.arange(frames) / 25, tuple(LANDMARK_JOINTS), uv, np.ones((frames, 16))
         )
 
     assert people.main_person({1: keypoints(100, 50), 2: keypoints(60, 200)}) == 2
@@ -320,8 +308,7 @@ def test_tiles_cover_the_picture():
 def test_absent_weights_name_the_remedy(tmp_path, monkeypatch):
     monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
     with pytest.raises(
-        UserError,
-        match=f"pose_detection.tflite: .* not in {tmp_path}; run gait detect --fetch",
+        UserError, match=f"pose_detection.tflite: .* not in {tmp_path}; run gait detect --fetch"
     ):
         weights.load(weights.PERSON)
 
@@ -336,8 +323,7 @@ def test_damaged_weights_are_refused(tmp_path, monkeypatch):
 def test_a_folder_of_weights_that_is_none_is_refused(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path / "nowhere"))
     with pytest.raises(
-        UserError,
-        match="GAIT_WEIGHTS: .*nowhere is not a folder; unset it, or run gait detect",
+        UserError, match="GAIT_WEIGHTS: .*nowhere is not a folder; unset it, or run gait detect"
     ):
         weights.find(weights.PERSON)
 
@@ -356,8 +342,7 @@ def test_a_package_that_cannot_be_had_is_one_line(tmp_path, monkeypatch):
     failed = subprocess.CompletedProcess([], 1, "", "a\nERROR: no network\n")
     monkeypatch.setattr(subprocess, "run", lambda *args, **kwargs: failed)
     with pytest.raises(
-        UserError,
-        match=r"mediapipe==.*cannot be downloaded \(ERROR: no network\); try again",
+        UserError, match=r"mediapipe==.*cannot be downloaded \(ERROR: no network\); try again"
     ):
         weights.fetch(lambda line: None)
     assert list(tmp_path.iterdir()) == []
@@ -401,21 +386,7 @@ def test_no_person_writes_nothing(fetched, tmp_path, capsys):
 
 def test_a_simulated_walk_is_found(fetched, tmp_path, capsys):
     clip = tmp_path / "walk"
-    assert (
-        cli.main(
-            [
-                "simulate",
-                "-o",
-                str(clip),
-                "--frames",
-                "8",
-                "--size",
-                "480x360",
-                "--quiet",
-            ]
-        )
-        == 0
-    )
+    assert cli.main(["simulate", "-o", str(clip), "--frames", "8", "--size", "480x360", "--quiet"]) == 0
     out = tmp_path / "k.csv"
     capsys.readouterr()
     assert cli.main(["detect", str(clip / "video.mp4"), "-o", str(out), "--json"]) == 0
@@ -431,10 +402,7 @@ def test_people_of_a_real_film_are_found_and_placed(fetched):
     known = json.loads((clip / "init.json").read_text())
     found = people.detect(Video(clip / "video.mp4"), first=26, stop=60)
     start = find_keypoint_start(
-        found[people.main_person(found)],
-        Camera.read(clip / "camera.json"),
-        Model(),
-        height=1.65,
+        found[people.main_person(found)], Camera.read(clip / "camera.json"), Model(), height=1.65
     )
     gone = (known["frame"] - start.frame) / 30
     phase = start.mean.phase + gone * start.mean.stride_hz - known["phase"]
