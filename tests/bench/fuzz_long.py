@@ -124,10 +124,12 @@ def main() -> int:
         "commit; executions and CPU time of several runs are added up. A fault is a report of a sanitizer, a "
         "target that aborts because a promise is broken, 60 s for one input, or 2 GB of memory."
     )
-    rows = recorded() if args.record or args.add else {}
+    rows: dict[str, list[Any]] = {}
     for name in args.only or sorted(folder.name for folder in CORPUS.iterdir()):
         run = fuzz(name, args.runs, args.seed, args.seconds)
         faults += run[HEAD.index("faults") - 1]
+        if args.record or args.add:
+            rows = recorded()  # with those of runs that ended meanwhile
         rows[name] = together(name, run, rows.get(name) if args.add else None)
         if args.keep:
             keep(name)
