@@ -65,7 +65,7 @@ def read_start(
 
 
 def start_in_keypoints(
-    scene: Scene, id: int, first: int, stop: int, height: float | None = None
+    scene: Scene, id: int, first: int, stop: int, height: float | None = None, best_second: bool = False
 ) -> Start | None:
     """Find a start in a person's keypoints, as `find_keypoint_start`; None also without keypoints."""
     if id not in scene.people:
@@ -78,6 +78,7 @@ def start_in_keypoints(
         stop=stop,
         height=height,
         poses=scene.poses,
+        best_second=best_second,
     )
 
 

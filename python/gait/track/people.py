@@ -30,7 +30,7 @@ from gait.report.film import Films, PageFilm
 from gait.report.people_page import Person, people_page
 from gait.track.clip import track_scene
 from gait.track.clip_background import require_scene
-from gait.track.keypoint_start import find_keypoint_start
+from gait.track.first_state import start_in_keypoints
 from gait.track.options import ClipOptions
 from gait.track.other_people import Outline, with_track
 from gait.track.read_scene import read_scene
@@ -102,16 +102,9 @@ def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
     for id in by_size(scene.people):
         if len(starts) == options.people:
             break
-        found = find_keypoint_start(
-            scene.people[id],
-            scene.camera,
-            scene.model,
-            first=scene.frames.start,
-            stop=scene.frames.stop,
-            height=options.height if id == scene.person else None,
-            poses=scene.poses,
-            best_second=True,
-        )
+        stature = options.height if id == scene.person else None
+        frames = scene.frames
+        found = start_in_keypoints(scene, id, frames.start, frames.stop, stature, best_second=True)
         if found is None or not found.hypotheses[0].walks:
             warning(f"person {id} is not tracked: no second in which they walk in full view", options.quiet)
         else:
