@@ -370,6 +370,18 @@ def test_people_cross_and_the_nearer_one_hides_the_other(tmp_path: Path) -> None
     assert apart.max() > 0.5
 
 
+def test_each_person_of_a_clip_is_described_separately(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--people", "crossing", "--view", "toward", "--frames", "3", "--size", "160x120", "--quiet"]
+    assert main(["simulate", "-o", str(tmp_path), *words]) == 0
+    first, second = (json.loads((tmp_path / name).read_text()) for name in ("meta.json", "meta_2.json"))
+    assert (first["direction"], second["direction"]) == ("left to right", "right to left")
+    assert (first["view"], second["view"]) == ("toward", "away")
+    assert first["seed"] == second["seed"] and first["clip"] == second["clip"]
+    assert f"2 people, the first of {first['stature_m']:.2f} m" in capsys.readouterr().out
+
+
 def json_pelvis(path: Path) -> np.ndarray:
     """Return the place in an init file."""
     return np.array(json.loads(path.read_text())["pelvis"])

@@ -146,6 +146,7 @@ def run(args: argparse.Namespace) -> int:
         "frames": scenario.frames,
         "view": scenario.view,
         "moving": scenario.moving,
+        "people": 1 + COMPANY[scenario.people],
         "seed": scenario.seed,
         "stature_m": meta["stature_m"],
         "speed_m_s": meta["mean_speed_m_s"],
@@ -172,8 +173,10 @@ def _text(summary: dict[str, Any], folder: str) -> str:
         "pan": f"{summary['view']} view from a camera that pans",
         "shake": f"{summary['view']} view from a hand-held camera",
     }.get(summary["moving"], f"{summary['view']} view")
+    people = summary["people"]
+    who = "a person of" if people == 1 else f"{people} people, the first of"
     return (
-        f"{folder}: {summary['frames']} frames, {view}, a person of "
+        f"{folder}: {summary['frames']} frames, {view}, {who} "
         f"{summary['stature_m']:.2f} m and {middle} ({low}-{high}) pixels at "
         f"{summary['speed_m_s']:.2f} m/s, {summary['stride_hz']:.2f} strides/s"
     )

@@ -152,8 +152,8 @@ def first_state(stage: Stage, strikes: Array) -> dict[str, Any]:
     return {"frame": 0, "pelvis": pelvis.round(5).tolist(), **rounded, "sd": dict(DEFAULT_SD)}
 
 
-def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any]:
-    """Return meta.json: how the clip was made and what happens in it."""
+def describe(stage: Stage, made: Set, events: dict[str, Array], seed: int) -> dict[str, Any]:
+    """Return a person's meta.json: how the clip was made, from which seed, and what they do in it."""
     scenario, walk, frames = stage.scenario, stage.walk, stage.frames
     inside = {
         name: [round(float(t), 3) for t in times if 0 <= t <= len(frames) - 1]
@@ -163,7 +163,7 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
     pelvis = walk.origins[frames, 0]
     tall = _height_px(stage)
     about = {
-        "clip": f"gait simulate, seed {scenario.seed}",
+        "clip": f"gait simulate, seed {seed}",
         "fps": scenario.fps,
         "frames": scenario.frames,
         "width": stage.camera.width,
@@ -203,7 +203,7 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
         "shutter_fraction_of_frame": SHUTTER,
         "flicker": scenario.flicker,
         "crf": CRF,
-        "seed": scenario.seed,
+        "seed": seed,
         "generator": f"gait {__version__}",
         "license": "BSD-3-Clause, as libgait: motion, body, clothes and scene are generated",
     }
@@ -340,7 +340,7 @@ def simulate(
             events = find_events(one)
             write_truth(target / _numbered("truth.csv", k), one, events["r_heel_strike"])
             _write_json(target / _numbered("init.json", k), first_state(one, events["r_heel_strike"]))
-            metas.append(describe(one, replace(made, appearance=appearance), events))
+            metas.append(describe(one, replace(made, appearance=appearance), events, scenario.seed))
             _write_json(target / _numbered("meta.json", k), metas[-1])
         return metas[0]
 

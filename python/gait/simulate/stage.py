@@ -30,6 +30,7 @@ _AROUND = 20.0  # metres before and after the path that several cameras, or a mo
 _TURNS = 60.0, -60.0, 30.0  # degrees about the middle of the path from the first camera to the others
 # heading of the path for left to right, degrees from world x; the camera looks along +y
 _HEADING = {"side": 0, "oblique": -45, "toward": -90, "away": 90, "above": -30, "circle": 0}
+_OPPOSITE = {"toward": "away", "away": "toward"}  # view of a person who comes the other way
 _HEIGHT = {"side": 1.5, "oblique": 1.6, "toward": 1.5, "away": 1.5, "above": 3.6, "circle": 1.7}
 _AWAY = {"side": 6.5, "oblique": 5.0, "toward": 5.0, "away": 4.5, "above": 5.5, "circle": 6.5}
 
@@ -214,12 +215,13 @@ def _company(scenario: Scenario, path: Path) -> list[tuple[Scenario, Path]]:
     speed = pace(scenario, scenario.stature or _USUAL_STATURE)[0]
     side, apart = float(rng.choice([-1, 1])), float(rng.uniform(*_APART))
     if scenario.people == "crossing":
-        return [
-            (
-                replace(other, seed=_another(scenario, 1)),
-                replace(path, heading=path.heading + np.pi, aside=-side * apart),
-            )
-        ]
+        back = replace(
+            other,
+            seed=_another(scenario, 1),
+            direction="rl" if scenario.direction == "lr" else "lr",
+            view=_OPPOSITE.get(scenario.view, scenario.view),
+        )
+        return [(back, replace(path, heading=path.heading + np.pi, aside=-side * apart))]
     if scenario.people == "overtaking":
         faster = replace(other, seed=_another(scenario, 1), speed=min(_FASTER * speed, 2.5))
         return [(faster, replace(path, aside=side * apart))]
