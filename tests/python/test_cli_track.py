@@ -16,6 +16,7 @@ from gait.bindings.model import read_blob
 from gait.cli import main
 from gait.io import blob
 from gait.io import keypoints_file as tracks_file
+from gait.track import read_scene
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
@@ -282,6 +283,32 @@ def test_every_fault_is_one_line_and_leaves_no_output(options, words, scene, cap
     assert err.startswith("gait track: ")
     assert re.search(words, err)
     assert {path: path.read_bytes() for path in scene.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    "more", [[], ["--stabilize", "off"], ["--people", "all"]], ids=["default", "off", "people"]
+)
+@pytest.mark.parametrize(
+    ("plate", "words"),
+    [
+        ("grey.png", "grey.png: either it or .*walk.mp4 is grey"),
+        ("other.png", "other.png: half of frame 0 differs from it"),
+        ("small.png", "small.png: is 32x24, the video 320x240"),
+    ],
+)
+def test_a_background_of_another_scene_is_refused_before_long_work(
+    plate, words, more, scene, monkeypatch, capsys
+):
+    grey = cv2.cvtColor(wall(), cv2.COLOR_BGR2GRAY)
+    cv2.imwrite(str(scene / "grey.png"), grey)
+    cv2.imwrite(str(scene / "other.png"), wall(seed=1))
+    cv2.imwrite(str(scene / "small.png"), grey[:24, :32])
+    for work in "sample", "find_people":
+        monkeypatch.setattr(read_scene, work, lambda *_: pytest.fail("began long work"))
+    monkeypatch.setattr(read_scene, "require_detector", lambda _: None)
+    options = ["--background", scene / plate, "--init", "auto", *more]
+    assert track(scene, *options, out="fault.csv") == 1
+    assert re.search(words, capsys.readouterr().err)
 
 
 def test_render_a_pose(tmp_path, scene):

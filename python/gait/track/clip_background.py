@@ -7,7 +7,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.bindings.model import Model
 from gait.bindings.start_fit import StartFit
+from gait.camera.camera import Camera
 from gait.camera.path import CameraPose
 from gait.detect.shapes import find_people
 from gait.errors import UserError
@@ -16,6 +18,8 @@ from gait.progress import warning
 from gait.track.moving_video import map_pixels
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene, person_in_reference
+from gait.track.stabilise import moves
+from gait.track.walk_camera import expected_camera
 
 Array = NDArray[np.float64]
 
@@ -25,6 +29,7 @@ _TRUNKS = 200  # frames whose trunks are compared, evenly spread over the clip
 _SHAPES = 16  # frames searched for people's shapes, which is slow
 _TRUNK_HEIGHTS = (0.52, 0.81)  # of hips and shoulders, fractions of a person's height
 _TRUNK_HALF_WIDTH = 0.2  # of a trunk seen from the side, as a fraction of its height
+_DIFFERS = "half of frame {} differs from"
 _STAYS = 0.45  # share of a clip's frames from which the median may show a person
 
 
@@ -84,29 +89,48 @@ def _shape_trunks(scene: Scene) -> tuple[Array, Array, float]:
     return np.minimum(*trunk), np.maximum(*trunk), len(found) / len(samples)
 
 
+def require_background(
+    options: ClipOptions, video: Video, camera: Camera | None, model: Model, plate: Image, first: int
+) -> None:
+    """Raise UserError, before long work, if a background file does not show the scene of frame `first`.
+
+    If the camera moves, only their colours are compared.
+    """
+    frame = next(iter(video.frames(first, first + 1)), None)
+    if frame is None:
+        return
+    if one_is_grey(frame.image, plate):
+        raise UserError(
+            f"{options.background}: either it or {video.path} is grey, the other in colour; give both in the "
+            "same colours"
+        )
+    lens = camera or expected_camera(video, options.fov)
+    if not StartFit(model, lens).other_scene(frame.image, plate):
+        return
+    if options.stabilize == "off" or not moves(lens, sample_frames(video), {}):
+        raise _other_scene(options, first)
+
+
 def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
-    """Raise UserError if the background shows another scene than frame `first`, or only one has colours."""
+    """Raise UserError if a background file shows another scene than frame `first`; warn if the median does."""
     frame = next(iter(scene.video.frames(first, first + 1)), None)
     plate = frame.plate if frame is not None and scene.moving else scene.plate
     if plate is None or frame is None:
         return
-    if one_is_grey(frame.image, plate):
-        raise UserError(
-            f"{options.background}: either it or {scene.video.path} is grey, the other in colour; give both "
-            "in the same colours"
-        )
     if not StartFit(scene.model, scene.camera).other_scene(frame.image, plate):
         return
-    differs = f"half of frame {first} differs from"
     if options.background != "auto":
-        raise UserError(
-            f"{options.background}: {differs} it; give the empty scene of this camera, auto or none"
-        )
+        raise _other_scene(options, first)
     warning(
-        f"{differs} the median of the clip, the background: if the camera moves, give --camera-path, "
-        "--stabilize auto or --background none",
+        f"{_DIFFERS.format(first)} the median of the clip, the background: if the camera moves, give "
+        "--camera-path, --stabilize auto or --background none",
         options.quiet,
     )
+
+
+def _other_scene(options: ClipOptions, first: int) -> UserError:
+    differs = _DIFFERS.format(first)
+    return UserError(f"{options.background}: {differs} it; give the empty scene of this camera, auto or none")
 
 
 def one_is_grey(image: Image, plate: Image) -> bool:

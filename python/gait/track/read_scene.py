@@ -11,7 +11,7 @@ from gait.body.measured import model_of
 from gait.io.video import Video, background
 from gait.progress import progress, warning
 from gait.track.camera_check import contradiction
-from gait.track.clip_background import sample
+from gait.track.clip_background import require_background, sample
 from gait.track.clip_camera import calibrate_clip, camera_motion, given_camera, static_plate
 from gait.track.clip_keypoints import cut_to, detects, find_people, require_detector
 from gait.track.first_state import read_start, who_starts
@@ -40,10 +40,13 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
     camera, poses = given_camera(options, video, frames)
     name = options.model or ("paper" if options.mode == Mode.PAPER else "walk")
     model = Model(name if options.body is None else model_of(options.body, name))
+    first = frames.start
     if starts and camera is not None and options.init != "auto":
-        read_start(options, video, camera, poses, model)  # to fail early if it is invalid
+        first = read_start(options, video, camera, poses, model).frame  # to fail early if it is invalid
     require_detector(options)
     given = None if options.background in ("auto", "none") else background(options.background, video)
+    if given is not None:
+        require_background(options, video, camera, model, given, first)
     with ThreadPoolExecutor(1) as pool:
         # Another core computes the median of the clip while the detector runs.
         beside = pool.submit(sample, options, video, poses) if detects(options) else None
