@@ -232,7 +232,8 @@ def test_tracks_of_a_detector_help(scene, tracks, capsys):
     assert "ignored: nose\n" in capsys.readouterr().err
 
 
-def test_tracks_of_other_frames_are_refused(scene, tracks, capsys):
+def test_tracks_of_other_frames_are_refused(scene, tracks, monkeypatch, capsys):
+    monkeypatch.setattr(read_scene, "sample", lambda *_: pytest.fail("began long work"))
     text = tracks.read_text().splitlines()
     late = [text[0], *(f"{i + 700}{row[row.index(',') :]}" for i, row in enumerate(text[1:]))]
     (scene / "late.csv").write_text("\n".join(late) + "\n")
@@ -309,6 +310,15 @@ def test_a_background_of_another_scene_is_refused_before_long_work(
     options = ["--background", scene / plate, "--init", "auto", *more]
     assert track(scene, *options, out="fault.csv") == 1
     assert re.search(words, capsys.readouterr().err)
+
+
+def test_a_camera_cannot_be_estimated_without_keypoints(scene, monkeypatch, capsys):
+    monkeypatch.setattr(read_scene, "sample", lambda *_: pytest.fail("began long work"))
+    words = ["track", str(scene / "walk.mp4"), "--height", "1.75", "-o", str(scene / "fault.csv")]
+    assert main([*words, "--detector", "none"]) == 1
+    assert (
+        "without --camera the keypoints of a walk are needed: leave out --detector" in capsys.readouterr().err
+    )
 
 
 def test_render_a_pose(tmp_path, scene):

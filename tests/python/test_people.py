@@ -1,6 +1,7 @@
 """Several people in one clip: each has a track, although one hides the other."""
 
 import json
+import re
 from types import SimpleNamespace
 
 import accessibility
@@ -18,7 +19,7 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.report.colours import OVER_PICTURES, PERSON_COLOURS
-from gait.track import clip_keypoints
+from gait.track import clip_keypoints, read_scene
 from gait.track.first_state import who_starts
 from gait.track.options import ClipOptions
 from gait.track.other_people import OTHER, OtherPeople, Outline
@@ -60,6 +61,7 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
     hidden = np.flatnonzero(apart < 0.3)
     assert 4 < len(hidden) < 15
     people = {4: detected(joints[0], hidden), 7: detected(joints[1])}
+    monkeypatch.setattr(read_scene, "require_detector", lambda _: None)
     monkeypatch.setattr(clip_keypoints, "_detect", lambda *_: (people, 7))
     write(tmp_path / "v.mp4", pictures)
     cv2.imwrite(str(tmp_path / "plate.png"), wall())
@@ -119,6 +121,14 @@ def test_another_person_hides_and_is_not_missed(crossing):
 def test_everyone_is_found_by_the_detector_alone(more, capsys):
     assert main(["track", "v.mp4", "--camera", "c.json", "-o", "t.csv", "--people", "2", *more]) == 2
     assert "--people" in capsys.readouterr().err
+
+
+def test_several_people_need_the_detectors_weights(tmp_path, capsys):
+    write(tmp_path / "v.mp4", [wall()] * 4)
+    (tmp_path / "c.json").write_text(json.dumps(camera().to_dict()))
+    words = ["track", "v.mp4", "--camera", "c.json", "-o", "t.csv", "--people", "all"]
+    assert main([str(tmp_path / word) if "." in word else word for word in words]) == 1
+    assert re.search("pose_detection.tflite: .*gait detect --fetch", capsys.readouterr().err)
 
 
 def test_the_first_people_do_not_have_the_colours_of_sides():

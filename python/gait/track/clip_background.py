@@ -112,7 +112,7 @@ def require_background(
 
 
 def require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
-    """Raise UserError if a background file shows another scene than frame `first`; warn if the median does."""
+    """Raise UserError if a background file shows another scene than frame `first`; warn if a median does."""
     frame = next(iter(scene.video.frames(first, first + 1)), None)
     plate = frame.plate if frame is not None and scene.moving else scene.plate
     if plate is None or frame is None:

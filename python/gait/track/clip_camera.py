@@ -5,7 +5,6 @@ from __future__ import annotations
 from gait.bindings.model import Model
 from gait.camera.camera import Camera, read_camera
 from gait.camera.path import CameraPath, CameraPose, stand_still
-from gait.detect import weights
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
@@ -114,11 +113,6 @@ def calibrate_clip(
     options: ClipOptions, video: Video, model: Model, people: dict[int, Keypoints], motion: CameraTurns | None
 ) -> tuple[int, Calibration]:
     """Estimate the camera from a walk; also return the id of the person who walks."""
-    if not people:
-        remedy = (
-            "leave out --detector none, or give --camera" if options.detector == "none" else weights.FETCH
-        )
-        raise UserError(f"{video.path}: without --camera the keypoints of a walk are needed: {remedy}")
     from gait.detect.people import by_size  # here, as it loads the networks' runtime
 
     assert options.height is not None

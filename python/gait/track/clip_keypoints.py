@@ -40,8 +40,13 @@ def has_detector(options: ClipOptions) -> bool:
 
 
 def require_detector(options: ClipOptions) -> None:
-    """Raise UserError, before long work, if weights are damaged, or missing although asked for."""
-    if detects(options):
+    """Raise UserError, before long work, if weights are damaged, or keypoints missing although needed."""
+    if not (options.camera or options.keypoints or detects(options)):
+        remedy = (
+            "leave out --detector none, or give --camera" if options.detector == "none" else weights.FETCH
+        )
+        raise UserError(f"{options.video}: without --camera the keypoints of a walk are needed: {remedy}")
+    if detects(options) or options.people is not None:
         weights.load(weights.PERSON)
         weights.load(weights.LANDMARK_NETWORKS[options.network])
 

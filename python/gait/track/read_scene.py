@@ -48,18 +48,18 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
     if given is not None:
         require_background(options, video, camera, model, given, first)
     with ThreadPoolExecutor(1) as pool:
-        # Another core computes the median of the clip while the detector runs.
-        beside = pool.submit(sample, options, video, poses) if detects(options) else None
-        if beside is None:
+        if detects(options):
+            # Another core computes the median of the clip while the detector runs.
+            beside, empty = pool.submit(sample, options, video, poses), None
+            if options.people is not None and not poses:
+                samples, plate = beside.result()
+                empty = static_plate(options, video, camera, samples, plate if given is None else given)
+            people, person = find_people(options, video, model, frames, empty)
+            samples, plate = beside.result()
+        else:
+            people, person = find_people(options, video, model, frames, None)
             with progress("background", video.count, options.quiet) as update:
                 samples, plate = sample(options, video, poses, update)
-        empty = None
-        if options.people is not None and beside is not None and not poses:
-            samples, plate = beside.result()
-            empty = static_plate(options, video, camera, samples, plate if given is None else given)
-        people, person = find_people(options, video, model, frames, empty)
-        if beside is not None:
-            samples, plate = beside.result()
     longer = people
     if options.further:
         people, person = cut_to(people, person, frames)
