@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gait import Video, VideoWriter
+from gait import Camera, Video, VideoWriter
 from gait.body.skeleton import axis_rotation
 from gait.camera.camera import read_camera, write_camera
 from gait.camera.silhouette_offset import Filmed, silhouette_offset
@@ -224,6 +224,29 @@ def test_each_frame_has_the_nearest_of_the_other_film_and_none_is_used_twice():
             SeveralVideos(slow, [fast], [never])
     early = list(SeveralVideos(slow, [fast], [0.5]).frames(0, 5))
     assert all(frame.others == (None,) for frame in early)  # the other film had not begun
+
+
+@pytest.mark.parametrize(
+    ("film", "offset", "words"),
+    [
+        ("one.mp4", "0", "one.mp4: has one frame"),
+        ("late.mp4", "100", "late.mp4: no frame is at the time of one of"),
+    ],
+)
+def test_a_film_that_shows_nothing_of_the_walk_is_refused_before_long_work(
+    film, offset, words, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(clip, "read_scene", lambda _: pytest.fail("began long work"))
+    for name, count in ("v.mp4", 4), ("late.mp4", 4), ("one.mp4", 1):
+        with VideoWriter(name, FPS) as writer:
+            for _ in range(count):
+                writer.write(np.zeros((240, 320, 3), np.uint8))
+    for number, place in enumerate(((0.0, -6.0, 1.4), (4.0, -4.0, 1.4))):
+        write_camera(tmp_path / f"{number}.json", Camera.looking(place, (0.0, 0.0, 0.9), (320, 240), 330.0))
+    words_given = ["track", "v.mp4", film, "--camera", "0.json", "--camera", "1.json", "--offsets", offset]
+    assert main([*words_given, "-o", "t.csv"]) == 1
+    assert words in capsys.readouterr().err
 
 
 def test_most_cameras_decide_whether_keypoints_are_near():

@@ -88,12 +88,21 @@ def _nearest(times: Array, others: Array) -> NDArray[np.int64]:
 
 
 def require_cameras(options: ClipOptions) -> None:
-    """Raise UserError if a camera file of several films cannot be used, before long work."""
-    if options.further:
-        assert options.camera is not None
-        films = ((options.video, options.camera), *options.further)
-        cameras = [Camera.read(file, Video(film).size, options.scale_camera) for film, file in films]
-        require_apart([film for film, _ in films], cameras)
+    """Raise UserError if one of several films, its camera or its offset cannot be used, before long work."""
+    if not options.further:
+        return
+    assert options.camera is not None
+    cameras = [options.camera, *(camera for _, camera in options.further)]
+    films = [Video(options.video), *(Video(film) for film, _ in options.further)]
+    for film in films[1:]:
+        if film.count < 2:
+            raise UserError(f"{film.path}: has one frame; give a film of the walk")
+    placed = [
+        Camera.read(file, film.size, options.scale_camera) for file, film in zip(cameras, films, strict=True)
+    ]
+    require_apart([str(film.path) for film in films], placed)
+    if options.offsets is not None:
+        SeveralVideos(films[0], films[1:], options.offsets)  # which finds frames at the same time
 
 
 def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
@@ -120,8 +129,6 @@ def with_further_cameras(options: ClipOptions, scene: Scene) -> Scene:
             stabilize="off",
         )
         one = read_scene(own, starts=False)
-        if one.video.count < 2:
-            raise UserError(f"{video}: has one frame; give a film of the walk")
         require_scene(options, one, 0)
         given = None if options.offsets is None else options.offsets[k]
         person, offset, words = synchronise([_film(each) for each in (scene, *scenes)], _film(one), given)
