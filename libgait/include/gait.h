@@ -463,7 +463,7 @@ typedef GAIT_ENUM(gait_track_status) {
           float, phase_r, , "")                                                                                       \
     FIELD("Weight of the dominant hypothesis in [0, 1].",                                                             \
           float, hypothesis_weight, , "")                                                                             \
-    FIELD("Speed along the ground.",                                                                                  \
+    FIELD("Speed along the ground; 0 if the class stands, when phase and stride rate have no meaning.",               \
           float, speed, , "metres per second")                                                                        \
     FIELD("State of the track.",                                                                                      \
           gait_track_status, status, , "")                                                                            \

@@ -26,9 +26,9 @@ from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.prior.model import meta_section, origin
 from gait.motion.verdict import verdict_of
 from gait.report.run_page import Run, run_page
-from gait.simulate.clip import simulate
+from gait.simulate.clip import describe, planned_events, simulate
 from gait.simulate.scenario import PRESETS, Scenario
-from gait.simulate.stage import set_stage
+from gait.simulate.stage import build_set, set_stage
 from gait.simulate.walk import TOE_OFF
 
 SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
@@ -368,6 +368,9 @@ def test_estimates_and_track_files_have_the_classes(model: gait.Model, tmp_path:
             rows.write(frame, one)
     track = track_file.read_track(path)
     assert track.motion_class == ["stand"] * 3
+    for name in ("phase", "stride_hz", "phase_sd", "stride_hz_sd"):
+        assert np.isnan(track.numbers[name]).all(), name
+    assert (track.numbers["speed_m_s"] == 0).all() and all(np.isfinite(one.mean.phase) for one in found)
     assert np.allclose(track.numbers["p_stand"], [one.class_probability[1] for one in found], atol=1e-4)
     assert track_file.header(2, (), ("walk",)) == track_file.header(2, ())
     page = run_page(Run("classes", track, verdict_of(track)))
@@ -394,6 +397,8 @@ def test_a_stop_brings_the_feet_together_without_a_slide(tmp_path: Path) -> None
         for part in ("heel", "toe"):  # a person who stands does not slide
             assert np.ptp(points[f"{side}_{part}"][inner], axis=0).max() < 0.005
     assert stage.walk.speed[stage.frames][:10].mean() > 0.9
+    found = describe(stage, build_set(stage), planned_events(stage))
+    assert 0.9 < found["stride_period_s"] < 1.3 and found["stride_period_sd_s"] < 0.1  # without the stand
 
 
 def test_backwards_moves_against_the_heading_and_turns_go_round() -> None:

@@ -213,6 +213,42 @@ def test_phase_of_the_truth_is_linear_between_strikes_and_goes_on_outside():
     assert Strikes(np.array([30.0]), np.zeros(0)).phase([1]) is None
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_stand_has_no_phase(mirrored):
+    """The person walks, stands from frame 80 to 200, and walks on."""
+    feet = [np.array([20.0, 50.0, 80.0, 215.0, 245.0]), np.array([5.0, 35.0, 65.0, 200.0, 230.0])]
+    strikes, late = Strikes(*feet[:: -1 if mirrored else 1]), 0.5 * mirrored
+    nan = np.nan
+    found = strikes.phase([5, 35, 50, 79, 81, 140, 199, 201, 214, 230, 250])
+    wanted = np.array([0.5, 0.5, 0, 29 / 30, nan, nan, nan, 0.5 + 1 / 30, 29 / 30, 0.5, 1 / 6])
+    np.testing.assert_allclose(found, (wanted + late) % 1.0, atol=1e-12)
+    # before the first strike and after the last the phase goes on for less than a stride
+    frames = np.arange(-100, 400)
+    known = frames[np.isfinite(strikes.phase(frames))]
+    assert 5 - 25 < known[0] < 5 - 15 and 245 + 15 < known[-1] < 245 + 25
+    rate = np.diff(strikes.cycles(frames[np.isfinite(strikes.phase(frames))]))
+    assert np.sum(np.abs(rate - 1 / 30) > 1e-9) == 1  # across the stand
+
+
+def test_a_stand_between_the_only_strikes_of_the_right_foot_leaves_the_cycles_of_the_left():
+    strikes = Strikes(right=np.array([19.6, 138.6]), left=np.array([3.3, 38.2]))
+    found = strikes.phase([3.3, 19.6, 28.9, 38.3, 60, 130, 143.6])
+    np.testing.assert_allclose(found, [0.5, 0, 0.25, np.nan, np.nan, np.nan, 5 / 34.9])
+
+
+def test_a_stand_counts_neither_in_the_phase_error_nor_as_swapped():
+    at = np.array([10.0, 20.0, 30.0, 75.0, 85.0, 95.0])
+    strikes = Strikes(right=at, left=at[:2] + 5)
+    true = np.nan_to_num(strikes.phase(TRUTH.frame))
+    still = (TRUTH.frame > 30) & (TRUTH.frame < 75)
+    swapped = track(phase=np.where(still, 0.45, true))
+    phase = evaluate(swapped, TRUTH, strikes=strikes, model=SECTIONS)["phase"]
+    assert phase["flips"] == 0 and phase["p90"] == pytest.approx(0, abs=1e-9)
+    nowhere = track(phase=np.where(still, 0.45, np.nan))
+    assert evaluate(nowhere, TRUTH, strikes=strikes, model=SECTIONS)["phase"] is None
+    assert free_run(SECTIONS, TRUTH, strikes, first=50) is None
+
+
 def test_zeni_finds_the_models_own_strikes():
     found = strikes_by_zeni(TRUTH)
     for side in ("right", "left"):

@@ -33,7 +33,7 @@ class Estimate:
     hypothesis_weight : float
         Weight of the dominant left/right hypothesis, [0, 1].
     speed : float
-        Metres per second along the ground.
+        Metres per second along the ground; 0 if the most probable class stands.
     mean, sd, best : State
         Mean of the dominant hypothesis; standard deviations over all particles; the heaviest particle.
     joints : ndarray of shape (P, 3)
@@ -71,6 +71,11 @@ class Estimate:
     reason: str = ""
     motion_class: str = "walk"
     class_probability: Array = field(default_factory=lambda: np.ones(1))
+
+    @property
+    def takes_strides(self) -> bool:
+        """Whether phase and stride rate mean anything: not in a class that stands, nor if they are NaN."""
+        return self.speed != 0 and not np.isnan(self.mean.phase)  # only a class that stands has no speed
 
     def joint(self, name: str) -> Array:
         """Position of one joint in the world, shape (3,), metres; ValueError unless the model has it."""

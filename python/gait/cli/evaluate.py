@@ -3,7 +3,8 @@
 Prints, over the frames in both files, with an explanation of each line:
   the 3-D error of 15 joints in mm, unaligned and after aligning the hip midpoints (the pose);
   the share of frames that are far off or lost;
-  the phase error, with swaps of left and right counted separately;
+  the phase error, with swaps of left and right counted separately, within gait cycles (a person who stands
+  has no phase);
   the distance in the picture;
   how often the 50 % and 90 % intervals contain the truth;
   the pose error of two baselines without images: the mean pose at the true position, and the mean stride

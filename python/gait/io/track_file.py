@@ -31,7 +31,7 @@ STATE_COLUMNS = (
 )
 SD_COLUMNS = ("phase_sd", "stride_hz_sd", "heading_sd_rad", "stature_sd_m")
 STRIDE_COLUMNS = ("phase", "stride_hz", "speed_m_s", "phase_sd", "stride_hz_sd")
-"""Empty in frames in which the person takes no strides."""
+"""Empty in frames in which the person takes no strides; the speed is 0 if the class of motion stands."""
 STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
@@ -120,7 +120,11 @@ class TrackWriter:
         """Append the estimate of one frame; without probabilities of all classes, their cells are empty."""
         state, sd = estimate.mean, estimate.sd
         joints = np.hstack([estimate.joints, estimate.joint_sd])[self._order]
-        values = [state.phase, state.stride_hz, state.heading, state.stature, estimate.speed]
+        nan = float("nan")
+        stride, stride_sd = (
+            (one.phase, one.stride_hz) if estimate.takes_strides else (nan, nan) for one in (state, sd)
+        )
+        values = [*stride, state.heading, state.stature, estimate.speed]
         self._csv.writerow(
             [frame.number, f"{frame.time:.6f}", estimate.status.name.lower()]
             + [_or_empty(value) for value in values]
@@ -128,7 +132,7 @@ class TrackWriter:
             + [f"{value:.4f}" for value in self._scores(state.coef)]
             + [f"{value:.5f}" for value in joints.ravel()]
             + [f"{value:.3f}" for value in np.degrees(estimate.angles)]
-            + [_or_empty(value) for value in (sd.phase, sd.stride_hz, sd.heading, sd.stature)]
+            + [_or_empty(value) for value in (*stride_sd, sd.heading, sd.stature)]
             + [f"{value:.4f}" for value in self._scores(sd.coef)]
             + self._of_class(estimate)
             + self._of_clip(estimate)

@@ -304,7 +304,7 @@ class Feed:
             "points": rounded(estimate.joints),
             "sd": rounded(estimate.joint_sd),
             "phase": round(float(mean.phase), 4),
-            "cadence": round(120.0 * float(mean.stride_hz), 1),
+            "cadence": round(120.0 * float(mean.stride_hz), 1) if estimate.takes_strides else 0.0,
             "speed": round(float(estimate.speed), 3),
             "motion": class_words(estimate),
             "rate": self._persons[person].rate(),

@@ -50,7 +50,7 @@ def free_run(
     None if the phase is unknown.
     """
     cycles = strikes.cycles(np.append(truth.frame[first], truth.frame[first] + 1))
-    if cycles is None:
+    if cycles is None or np.isnan(cycles).any():
         return None
     advance = (truth.frame - truth.frame[first]) * (cycles[1] - cycles[0])
     size = stature(model, truth)
@@ -168,8 +168,8 @@ def evaluate(
     ``50`` and ``90`` % intervals; ``static`` and ``free``: the baselines; ``root12``: like ``root``, over
     shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D pose networks have; ``proc``: after
     the best rotation, scale and shift of each frame, only for comparison with the literature; ``status``,
-    ``trust`` (see `trust`); ``calibration`` (see `calibration`). ``phase`` is None if strikes or phases are
-    unknown, ``px`` if the camera is. UserError if they have no frame in common.
+    ``trust`` (see `trust`); ``calibration`` (see `calibration`). ``phase`` is None if no frame has both a
+    true and an estimated one, ``px`` if the camera is unknown. UserError if they have no frame in common.
     """
     common, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     if len(common) == 0:
@@ -177,13 +177,13 @@ def evaluate(
     found, true = track.eval15()[ours], truth.eval15()[theirs]
     status = np.array(track.status)[ours]
     given_up = status == "lost"
-    phase, true_phase = track.phase[ours], strikes.phase(common)
+    true_phase = strikes.phase(common)
     still = static_pose(model, truth)[theirs]
     free = free_run(model, truth, strikes, first=int(theirs[0]))
     return {
         "frames": len(common),
         **pose_errors(found, true, given_up),
-        "phase": None if true_phase is None or np.isnan(phase).all() else phase_errors(phase, true_phase),
+        "phase": None if true_phase is None else phase_errors(track.phase[ours], true_phase),
         "px": None if camera is None else picture_errors(found, true, camera),
         "coverage": coverage(found, track.eval15_sd()[ours], true),
         "static": pose_errors(still, true),
@@ -245,14 +245,17 @@ def trust(root: Array, status: NDArray[np.str_]) -> dict[str, float]:
     return {"wrong_tracking": float(silent.mean()), "weighted_lost": float((lost + 1.0 * silent).mean())}
 
 
-def phase_errors(found: Array, true: Array) -> dict[str, float]:
-    """Errors of the phase in cycles.
+def phase_errors(found: Array, true: Array) -> dict[str, float] | None:
+    """Errors of the phase in cycles; None if no frame counts.
 
     A frame is flipped if its phase is nearer to half a cycle from the truth than to the truth: ``flips`` is
     the share of such frames.  The other figures are without that half cycle: ``median``, ``mean`` and ``p90``
-    of the absolute error, and ``bias``, the mean error.  Frames without a phase do not count.
+    of the absolute error, and ``bias``, the mean error.  Frames count that have a phase both in the track
+    and in the truth, where it exists only within a gait cycle (`Strikes.cycles`), not in a stand.
     """
-    known = np.isfinite(found)
+    known = np.isfinite(found) & np.isfinite(true)
+    if not known.any():
+        return None
     error = (found[known] - true[known] + 0.5) % 1.0 - 0.5
     flipped = np.abs(error) > 0.25
     error = np.where(flipped, error - np.copysign(0.5, error), error)

@@ -26,6 +26,7 @@ from gait.io.track_file import Joints, Track
 Array = NDArray[np.float64]
 
 ASSUMED_STRIDE_S = 1.1  # seconds; stride time assumed where the true one is unknown
+LONGEST_CYCLE = 1.6  # usual strides; a longer gap between strikes of a foot holds a stand or a missed strike
 _LEAST_STRIKE_GAP_S = 0.5  # least seconds between strikes of one foot
 _SWING_REACH_M = 0.1  # least metres that a foot swings past the pelvis
 
@@ -38,34 +39,69 @@ class Strikes:
     left: Array
 
     def phase(self, frames: ArrayLike) -> Array | None:
-        """Phase [0, 1) at frame numbers (n,), linear between strikes; None if fewer than two are known.
-
-        Right strikes are phase 0.  Left strikes, which are only near 0.5, are used if there are too few right
-        ones.
-        """
+        """Phase [0, 1) at frame numbers (n,), as `cycles` without the whole strides."""
         cycles = self.cycles(frames)
         return None if cycles is None else cycles % 1.0
 
     def cycles(self, frames: ArrayLike) -> Array | None:
-        """Return the phase without wrapping, in strides, extrapolated before the first and after the last."""
-        at: Array = self.right
-        count: Array = np.arange(len(self.right), dtype=float)
-        if len(at) < 2:
-            at, count = self._both()
+        """Return the phase without wrapping, in strides; None if fewer than two strikes are known.
+
+        Phase exists only within a gait cycle, from a strike of a foot to its next one, which lasts at most
+        1.6 times as long as the usual stride of both feet (a longer gap holds a stand), and for at most 0.8
+        of the usual stride before the first strike of either foot and after the last; elsewhere it is NaN.
+
+        It is linear within the cycles of the right foot, whose strikes are phase 0; where there are none,
+        between the strikes of both feet, of which those of the left are only near 0.5.
+        """
+        at = np.concatenate([self.right, self.left])
         if len(at) < 2:
             return None
-        frames = np.asarray(frames, float)
-        piece = np.clip(np.searchsorted(at, frames, side="right") - 1, 0, len(at) - 2)
-        share = (frames - at[piece]) / (at[piece + 1] - at[piece])
-        return np.asarray(count[piece] + share * (count[piece + 1] - count[piece]))
+        right = np.arange(len(self.right), dtype=float)
+        left = np.searchsorted(self.right, self.left) - 0.5
+        order = np.argsort(at, kind="stable")
+        at, count = at[order], np.concatenate([right, left])[order]
+        frames, stride = np.asarray(frames, float), self._stride()
+        of_both = _between_strikes(frames, at, count, stride)
+        if len(right) < 2:
+            return of_both
+        of_right = _between_strikes(frames, self.right, right, stride, only_whole=True)
+        inside = (frames >= self.right[0]) & (frames <= self.right[-1])
+        return np.where(np.isfinite(of_right) & (inside | np.isfinite(of_both)), of_right, of_both)
 
-    def _both(self) -> tuple[Array, Array]:
-        """Merge the strikes of both feet, which are half a stride apart."""
-        at = np.concatenate([self.right, self.left])
-        order = np.argsort(at)
-        is_left = np.concatenate([np.zeros(len(self.right), bool), np.ones(len(self.left), bool)])[order]
-        first = 0.5 if len(at) and is_left[0] else 0.0
-        return at[order], first + 0.5 * np.arange(len(at), dtype=float)
+    def strides(self) -> Array:
+        """Return how long the strides of both feet take, frames, without gaps that hold a stand."""
+        gaps = np.concatenate([np.diff(self.right), np.diff(self.left)])
+        return gaps[gaps <= LONGEST_CYCLE * np.quantile(gaps, 0.25)] if len(gaps) else gaps
+
+    def _stride(self) -> float:
+        """Usual stride, frames: the median, or twice a step if there are no whole strides."""
+        found = self.strides()
+        return float(np.median(found)) if len(found) else 2 * float(abs(self.left[0] - self.right[0]))
+
+
+def _between_strikes(
+    frames: Array, at: Array, count: Array, stride: float, *, only_whole: bool = False
+) -> Array:
+    """Interpolate the strides `count` (k,) at strikes `at` (k,); NaN in gaps longer than a cycle may be.
+
+    `stride`: usual one, frames. Outside the strikes the first or last gap goes on, or, if it is longer than a
+    cycle, the usual stride, or none with `only_whole`.
+    """
+    strides, gap = np.diff(count), np.diff(at)
+    whole = gap <= LONGEST_CYCLE * stride * strides
+    rate = np.divide(strides, gap, out=np.full(len(gap), 1 / stride), where=whole)[[0, -1]]
+    beyond = np.array([-1.0, 1.0]) * stride * (1.0 if only_whole else LONGEST_CYCLE / 2)
+    ends, reached = at[[0, -1]] + beyond, count[[0, -1]] + beyond * rate
+    value = np.interp(
+        frames,
+        np.concatenate([ends[:1], at, ends[1:]]),
+        np.concatenate([reached[:1], count, reached[1:]]),
+        left=np.nan,
+        right=np.nan,
+    )
+    outside = whole[[0, -1]] | (not only_whole)
+    known = np.concatenate([outside[:1], whole, outside[1:]])
+    return np.where(known[np.searchsorted(at, frames, side="right")], value, np.nan)
 
 
 def meta_of(truth: str | os.PathLike[str]) -> Path:

@@ -23,6 +23,7 @@ from gait.body.motion_classes import class_names, class_sections, first_class
 from gait.errors import UserError
 from gait.io.track_file import Joints, Track
 from gait.motion.footfalls import (
+    LONGEST_CYCLE,
     STRIKE_SIDES,
     Contacts,
     Draws,
@@ -287,7 +288,7 @@ def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:
 
 def _whole(start: Array, end: Array, stride: float) -> NDArray[np.bool_]:
     """Which intervals between strikes are one stride, without a missed strike in between."""
-    return (end - start > 0.6 * stride) & (end - start < 1.6 * stride)
+    return (end - start > 0.6 * stride) & (end - start < LONGEST_CYCLE * stride)
 
 
 def measured(track: Track, draws: Draws | None = None) -> Parameters | None:

@@ -83,7 +83,7 @@ class Verdict:
             text += f"; {what} in {count_of(self.counts['ambiguous'], 'frame')}"
             why = [f"{reason} ({count})" for reason, count in self.why.items()]
             text += f": {', '.join(why if len(why) > 1 else self.why)}" if why else ""
-        rest = {"no strides yet": self.no_strides} if self.no_strides else {}
+        rest = {"no strides": self.no_strides} if self.no_strides else {}
         rest |= {"lost": self.counts["lost"], "settling": self.counts["init"], "not found": self.absent}
         return "; ".join([text, *(f"{what} in {count_of(n, 'frame')}" for what, n in rest.items() if n)])
 

@@ -55,7 +55,7 @@ def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> N
 def _figures(estimate: Estimate) -> tuple[str, ...]:
     if np.isnan(estimate.mean.phase):
         return "no strides", ""
-    steps = 120 * estimate.mean.stride_hz if estimate.speed else 0.0
+    steps = 120 * estimate.mean.stride_hz if estimate.takes_strides else 0.0
     of_class = class_words(estimate)
     return (f"{steps:5.1f} steps/min", f"{estimate.speed:5.2f} m/s", *([of_class] if of_class else []))
 

@@ -19,6 +19,7 @@ from gait.camera.path import CameraPose, write_path
 from gait.errors import UserError
 from gait.io.files import replacing, require_writable
 from gait.io.video import VideoWriter, write_picture
+from gait.motion.footfalls import Strikes
 from gait.simulate.body import BONE_INDEX, SIDES
 from gait.simulate.geometry import Array, Ints, Picture
 from gait.simulate.render import DEFOCUS_PX, SHUTTER, Renderer, develop, light
@@ -159,7 +160,7 @@ def describe(stage: Stage, made: Set, events: dict[str, Array], seed: int) -> di
         name: [round(float(t), 3) for t in times if 0 <= t <= len(frames) - 1]
         for name, times in events.items()
     }
-    strides = np.diff(events["r_heel_strike"]) / scenario.fps
+    strides = Strikes(events["r_heel_strike"], np.zeros(0)).strides() / scenario.fps
     pelvis = walk.origins[frames, 0]
     tall = _height_px(stage)
     about = {
