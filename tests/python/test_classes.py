@@ -360,6 +360,7 @@ def test_estimates_and_track_files_have_the_classes(model: gait.Model, tmp_path:
         assert one.class_probability.sum() == pytest.approx(1, abs=1e-5)
         assert one.motion_class == model.classes[int(one.class_probability.argmax())] == "stand"
         assert one.speed == 0 and model.classes[one.mean.motion_class] == one.motion_class
+        assert not one.takes_strides and replace(one, speed=1.0).takes_strides
     path = tmp_path / "t.csv"
     sizes = model.info.components, model.joint_names, model.angle_names
     with track_file.TrackWriter(path, *sizes, model.classes) as rows:
