@@ -149,7 +149,7 @@ def test_who_is_passed_by_others_is_followed_among_them(tmp_path, fetched):
     camera, out = str(man.folder / "camera.json"), str(tmp_path / "t.csv")
     given = [str(man.video), "--camera", camera, "--people", "all", "-o", out]
     assert main(["track", *given, "--quiet"]) == 0
-    followed, woman = (read_estimates(str(tmp_path / f"t-{id}.csv")) for id in (1, 3))
+    followed, woman = (read_estimates(str(tmp_path / f"t-{k}.csv")) for k in (1, 2))
     cameras = dict.fromkeys(followed.frame.tolist(), Camera.read(camera))
     found = real_clip.score(man, followed, cameras)
     assert found.share["good"] > 0.95 and found.tracking > 120 and found.wrong == 0

@@ -1,5 +1,6 @@
 """Several people in one clip: each has a track, although one hides the other."""
 
+import csv
 import json
 import re
 from types import SimpleNamespace
@@ -60,7 +61,8 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
     apart = np.abs(joints[0, :, 0, 0] - joints[1, :, 0, 0])
     hidden = np.flatnonzero(apart < 0.3)
     assert 4 < len(hidden) < 15
-    people = {4: detected(joints[0], hidden), 7: detected(joints[1])}
+    aside = np.repeat(joints[1][:1] + (1.2, 0, 0), FRAMES, axis=0)
+    people = {4: detected(joints[0], hidden), 5: detected(aside), 7: detected(joints[1])}
     monkeypatch.setattr(read_scene, "require_detector", lambda _: None)
     monkeypatch.setattr(clip_keypoints, "_detect", lambda *_: (people, 7))
     write(tmp_path / "v.mp4", pictures)
@@ -71,18 +73,23 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
     monkeypatch.chdir(tmp_path)
     assert main(words) == 0
     printed = capsys.readouterr().out
-    assert "person 4: Tracked" in printed and "t-7.csv" in printed
+    assert "person 1: Tracked" in printed and "person 2: Tracked" in printed and "t-2.csv" in printed
+    u, v = people[5].uv[0].mean(axis=0)
+    other = f"omeone in view from frame 0 to 43, at first near pixel ({u:.0f}, {v:.0f}), is not tracked"
+    assert f"\ns{other}" in printed
     assert Video("o.mp4").count == FRAMES
     page = (tmp_path / "r.html").read_text()
     accessibility.check_file(tmp_path / "r.html")
-    assert 'href="r-4.html"' in page and (tmp_path / "r-7.html").stat().st_size > 100_000
+    assert 'href="r-1.html"' in page and f"S{other}" in page
+    assert (tmp_path / "r-2.html").stat().st_size > 100_000
     order = [MODEL.joint_names.index(name) for name in ("l_knee", "r_knee", "l_ankle", "r_ankle")]
-    for truth, id in zip(joints, (4, 7), strict=True):
-        rows = read_track(f"t-{id}.csv")
+    for truth, number in zip(joints, (2, 1), strict=True):  # the nearer is 1
+        rows = read_track(f"t-{number}.csv")
         assert rows.frame.tolist() == list(range(FRAMES)) and "lost" not in rows.status
         mine = np.stack([rows.places[MODEL.joint_names[k]] for k in order], axis=1)
         assert np.linalg.norm(mine - truth[:, order], axis=2).mean(axis=1).max() < 0.25
-    assert "person" in (tmp_path / "t-4.csv").read_text().splitlines()[0].split(",")
+        with open(f"t-{number}.csv", newline="") as file:
+            assert {row["person"] for row in csv.DictReader(file)} == {str(number)}
 
 
 def test_a_start_takes_the_person_who_walks(crossing):
@@ -129,6 +136,22 @@ def test_several_people_need_the_detectors_weights(tmp_path, capsys):
     words = ["track", "v.mp4", "--camera", "c.json", "-o", "t.csv", "--people", "all"]
     assert main([str(tmp_path / word) if "." in word else word for word in words]) == 1
     assert re.search("pose_detection.tflite: .*gait detect --fetch", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--camera-path", "t-2.csv"], "t-2.csv: is read by this command"),
+        (["--cameras-out", "t-1.csv"], "t-1.csv: two outputs have this name"),
+        (["--trc", "full/o.trc"], "o-2.trc: is a folder"),
+    ],
+)
+def test_files_of_each_person_are_checked_before_long_work(more, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "full" / "o-2.trc").mkdir(parents=True)
+    (tmp_path / "t-2.csv").touch()
+    assert main(["track", "v.mp4", "--camera", "c.json", "-o", "t.csv", "--people", "2", *more]) == 1
+    assert words in capsys.readouterr().err
 
 
 def test_the_first_people_do_not_have_the_colours_of_sides():

@@ -127,8 +127,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--people",
         type=_people,
         metavar="N",
-        help="track several people: all who walk, or the N (up to 8) in view longest and tallest; each gets "
-        "separate files, OUT-1.csv and so on; --overlay shows all",
+        help="track several people: all who walk, or the N (up to 8) in view longest and tallest. They are "
+        "numbered from 1 in that order: in the names of each person's files (OUT-1.csv, OUT-2.csv), in the "
+        "column person, and above the heads in the overlay",
     )
     add(
         "--keypoints-sd",
@@ -176,7 +177,7 @@ def run(args: argparse.Namespace) -> int:
     """Track the clip and print a summary."""
     from gait.body.measured import MeasuredBody
     from gait.track.clip import ClipOptions, track_clip
-    from gait.track.people import track_people
+    from gait.track.people import numbered, track_people
 
     if args.stop is not None:
         values.require_order(args.start or 0, args.stop)
@@ -214,8 +215,15 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--scale-camera: needs --camera")
     if args.camera and args.fov:
         raise UsageError("--fov: is for an estimated camera; leave out --camera or --fov")
+    of_each = (args.output, args.trc, args.draws, args.report)  # with --people, of each person
     require_outputs(
-        (args.output, args.camera_out, args.cameras_out, args.overlay, args.trc, args.draws, args.report),
+        (
+            *of_each,
+            *(numbered(path, k + 1) for k in range(args.people or 0) for path in of_each if path),
+            args.camera_out,
+            args.cameras_out,
+            args.overlay,
+        ),
         (
             *films,
             *cameras,
@@ -289,10 +297,7 @@ def _text_of_people(summary: dict[str, Any]) -> str:
             lines.append(f"warning: {one['warning']}")
         lines.append(f"  written: {', '.join(f'{what} {path}' for what, path in one['files'].items())}")
     lines += [f"written: {what} {path}" for what, path in summary["files"].items()]
-    if summary["others"]:
-        lines.append(
-            f"found but not tracked: {', '.join(f'person {number}' for number in summary['others'])}"
-        )
+    lines += summary["others"]
     return "\n".join(lines)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import NamedTuple
 from urllib.parse import quote
@@ -22,8 +22,8 @@ class Person(NamedTuple):
     """BGR colour in the film."""
 
 
-def people_page(title: str, people: Mapping[str, Person], film: PageFilm) -> str:
-    """Make the page's text; `people`: by their numbers in the film."""
+def people_page(title: str, people: Mapping[str, Person], others: Sequence[str], film: PageFilm) -> str:
+    """Make the page's text; `people`: by their numbers in the film; `others`: sentences on the others."""
     page = Page(title, f"{len(people)} people tracked" if len(people) != 1 else "1 person tracked")
     page.html(
         f'<video controls playsinline style="width:100%" aria-label="the film with everyone" '
@@ -38,6 +38,8 @@ def people_page(title: str, people: Mapping[str, Person], film: PageFilm) -> str
         for number, one in people.items()
     )
     page.figure("Everyone", movable(f"<table>{rows}</table>"))
+    for words in others:
+        page.words(f"{words[0].upper()}{words[1:]}.", "faint")
     return page.text()
 
 

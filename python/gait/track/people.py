@@ -57,7 +57,8 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
     assert options.people is not None
     scene = read_scene(options)
     require_scene(options, scene, scene.frames.start)
-    starts = _starts(options, scene)
+    starts, others = _starts(options, scene)
+    scene, starts = _numbered_scene(scene, starts, list(others))
     found: dict[int, Estimates] = {}
     outlines = dict(scene.people)
     people: dict[str, Any] = {}
@@ -80,11 +81,12 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
             for id, colour in _colours(found).items()
         }
         with replacing(options.report) as temporary:
-            temporary.write_text(people_page(Path(options.video).name, shown, film), encoding="utf-8")
+            page = people_page(Path(options.video).name, shown, list(others.values()), film)
+            temporary.write_text(page, encoding="utf-8")
         files["report"] = options.report
     return {
         "people": people,
-        "others": [id for id in scene.people if id not in starts],
+        "others": list(others.values()),
         "followed": any(one["followed"] for one in people.values()),
         "files": files,
     }
@@ -96,9 +98,11 @@ def numbered(path: str, id: int) -> str:
     return str(named.with_name(f"{named.stem}-{id}{named.suffix}"))
 
 
-def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
-    """Find the first state of everyone who walks, in the order of `by_size`."""
+def _starts(options: ClipOptions, scene: Scene) -> tuple[dict[int, Start], dict[int, str]]:
+    """Find the first state of everyone who walks, in the order of `by_size`; and why others do not."""
     starts: dict[int, Start] = {}
+    more = f"--people {options.people} leaves them out"
+    others = {id: _not_tracked(scene, id, more) for id in by_size(scene.people)}
     for id in by_size(scene.people):
         if len(starts) == options.people:
             break
@@ -106,12 +110,36 @@ def _starts(options: ClipOptions, scene: Scene) -> dict[int, Start]:
         frames = scene.frames
         found = start_in_keypoints(scene, id, frames.start, frames.stop, stature, best_second=True)
         if found is None or not found.hypotheses[0].walks:
-            warning(f"person {id} is not tracked: no second in which they walk in full view", options.quiet)
+            others[id] = _not_tracked(scene, id, "no second in which they walk in full view")
+            warning(others[id], options.quiet)
         else:
+            del others[id]
             starts[id] = replace(found, source="the joints detected in the images")
     if not starts:
         raise UserError(f"{options.video}: no one walks in full view for a second; check the camera")
-    return starts
+    return starts, others
+
+
+def _not_tracked(scene: Scene, id: int, why: str) -> str:
+    found = scene.people[id]
+    first, last = found.frame[[0, -1]].tolist()
+    u, v = np.nanmean(found.uv[0], axis=0)
+    where = f"from frame {first} to {last}, at first near pixel ({u:.0f}, {v:.0f})"
+    return f"someone in view {where}, is not tracked: {why}"
+
+
+def _numbered_scene(
+    scene: Scene, starts: dict[int, Start], others: list[int]
+) -> tuple[Scene, dict[int, Start]]:
+    """Give those who start the numbers from 1, and then the others, whose numbers the user never reads."""
+    numbers = {id: number for number, id in enumerate([*starts, *others], 1)}
+    scene = replace(
+        scene,
+        person=numbers[scene.person],
+        people={numbers[id]: one for id, one in scene.people.items()},
+        keypoints={numbers[id]: one for id, one in scene.keypoints.items()},
+    )
+    return scene, {numbers[id]: start for id, start in starts.items()}
 
 
 def _options_of(options: ClipOptions, scene: Scene, id: int, first: bool) -> ClipOptions:
