@@ -24,6 +24,7 @@ _KEYPOINT_WINDOW_S = 1.0  # seconds of keypoints that are fitted
 _WHOLE = 0.8  # share of the most frames of a window from which one counts as whole
 _WINDOW_STEP_S = 0.2  # seconds from one window to the next
 _CHOICE_S = 5.0  # seconds, from the first whole window that shows a walk, in which a better one is looked for
+_CHOICE_STEP_S = 0.4  # seconds between the windows among which it is looked for
 _BEST_WINDOW_CHI2 = (
     4.0  # chi-square per coordinate up to which the best window is used if no window shows a walk
 )
@@ -96,8 +97,9 @@ def find_keypoint_start(
     walks: list[tuple[bool, float, Start]] = []
     best: tuple[Start, Hypothesis] | None = None
     begin, end = -np.inf, np.inf
+    step = _CHOICE_STEP_S if best_second else _WINDOW_STEP_S
     for at, time in enumerate(times):
-        if time < begin + _WINDOW_STEP_S:
+        if time < begin + step:
             continue
         if time > end:
             break
