@@ -52,10 +52,13 @@ def camera_motion(
     people: dict[int, Keypoints],
     given: Image | None,
     frames: range,
+    *,
+    still: bool = False,
 ) -> tuple[dict[int, CameraPose], CameraTurns | None, float | None]:
     """Estimate the poses or turns of a camera that is not to count as still.
 
-    Of one that counts as still although it moves, return how far it turns, and print a note.
+    Of one that counts as still although it moves, return how far it turns, and print a note.  `still`: known
+    to stand still.
 
     Raises
     ------
@@ -64,7 +67,7 @@ def camera_motion(
         far.
     """
     lens, first = camera or expected_lens(video, options.fov, samples, people), camera is not None
-    turn = turn_in_samples(lens, samples, people) if samples else 0.0
+    turn = turn_in_samples(lens, samples, people) if samples and not still else 0.0
     far = turn is not None and turn > FURTHEST_TURN * video.width and not options.further
     estimated = options.stabilize == "auto" or (options.stabilize == "pans" and far)
     if estimated and first and given is None:

@@ -66,7 +66,9 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
     motion: CameraTurns | None = None
     turn: float | None = 0.0
     if not options.camera_path:
-        poses, motion, turn = camera_motion(options, video, camera, samples, people, given, frames)
+        poses, motion, turn = camera_motion(
+            options, video, camera, samples, people, given, frames, still=empty is not None
+        )
     calibration = None
     if camera is None:
         person, calibration = calibrate_clip(options, video, model, people, motion)
