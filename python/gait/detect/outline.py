@@ -53,9 +53,9 @@ def draw_person(canvas: Image, at: Mapping[str, Array], value: int) -> None:
 
 
 def _point(at: Array) -> tuple[int, int]:
-    x, y = np.clip(np.rint(at), -32000, 32000).astype(int)
-    return int(x), int(y)
+    x, y = (round(min(max(value, -32000.0), 32000.0)) for value in at.tolist())
+    return x, y
 
 
 def _pixels(length: float) -> int:
-    return int(np.clip(round(length), 1, 255))
+    return min(max(round(length), 1), 255)

@@ -56,6 +56,7 @@ class Overlaps:
         self._smooth = cv2.blur(empty, (3, 3))
         self._image = empty
         self._foreground: Mask = np.zeros(empty.shape[:2], bool)
+        self._outlines: dict[bytes, Mask] = {}  # of people in this picture, by their joints
 
     def see(self, image: Image) -> None:
         """Go on to the next picture.
@@ -70,6 +71,7 @@ class Overlaps:
                 "the empty scene and the pictures differ in size; give a background of this camera"
             )
         self._image = image
+        self._outlines.clear()
         blue, green, red = cv2.split(cv2.absdiff(cv2.blur(image, (3, 3)), self._smooth))
         self._foreground = cv2.max(cv2.max(blue, green), red) > _LEAST_DIFFERENCE
 
@@ -146,15 +148,11 @@ class Overlaps:
 
         On level ground nearer feet are lower in the picture.
         """
-        canvas = np.zeros(self._foreground.shape, np.uint8)
-        behind = [] if own is None else [uv for uv in others if nearness(uv) < nearness(own)]
-        for uv in behind:
-            _draw(canvas, uv, 1)
-        if own is not None:
-            _draw(canvas, own, 0)
-        for uv in others if own is None else [uv for uv in others if nearness(uv) >= nearness(own)]:
-            _draw(canvas, uv, 1)
-        return canvas > 0
+        if own is None:
+            return self._area(others)
+        behind = [uv for uv in others if nearness(uv) < nearness(own)]
+        nearer = [uv for uv in others if nearness(uv) >= nearness(own)]
+        return self._area(behind) & ~self._area([own]) | self._area(nearer)
 
     def part(self, uv: Array, hidden: Mask) -> float:
         """Return the share of a person's area that is not hidden."""
@@ -163,10 +161,19 @@ class Overlaps:
 
     def _area(self, people: Sequence[Array]) -> Mask:
         """Find the pixels (h, w) that people with these joints cover."""
-        canvas = np.zeros(self._foreground.shape, np.uint8)
+        area = np.zeros(self._foreground.shape, bool)
         for uv in people:
-            _draw(canvas, uv, 1)
-        return canvas > 0
+            area |= self._outline(uv)
+        return area
+
+    def _outline(self, uv: Array) -> Mask:
+        """Find the pixels (h, w) that a person with these joints covers."""
+        key = uv.tobytes()
+        if key not in self._outlines:
+            canvas = np.zeros(self._foreground.shape, np.uint8)
+            draw_person(canvas, dict(zip(LANDMARK_JOINTS, uv, strict=True)), 1)
+            self._outlines[key] = canvas.view(bool)
+        return self._outlines[key]
 
     def _remains(self, people: Sequence[Array], crop: Crop) -> bool:
         """Whether enough of a crop's middle in the picture is foreground that no one covers."""
@@ -196,7 +203,3 @@ def distinct(people: Sequence[Person]) -> bool:
 def nearness(uv: Array) -> tuple[float, float]:
     """Row of the lowest joint of a person (16, 2), then the mean column, which decides between equal rows."""
     return float(uv[:, 1].max()), float(uv[:, 0].mean())
-
-
-def _draw(canvas: Image, uv: Array, value: int) -> None:
-    draw_person(canvas, dict(zip(LANDMARK_JOINTS, uv, strict=True)), value)
