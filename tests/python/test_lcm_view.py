@@ -89,8 +89,10 @@ def test_each_estimate_is_drawn_into_its_own_frame(log):
         np.testing.assert_array_equal(picture, overlay.draw(rig.picture(i), estimate, i))
 
 
-@pytest.mark.parametrize("width, height", [(720, 1280), (320, 240), (1280, 720)])
-def test_a_legend_fits_films_of_any_aspect_and_leaves_the_panel(width, height):
+@pytest.mark.parametrize(
+    "width, height, beside", [(720, 1280, True), (320, 240, True), (1280, 720, True), (240, 320, False)]
+)
+def test_a_legend_fits_films_of_any_aspect_and_leaves_the_panel(width, height, beside):
     overlay = Overlay(rig.model(), replace(rig.CAMERA, width=width, height=height))
     plain, explained = (
         overlay.draw_absent(np.zeros((height, width, 3), np.uint8), 0.0, 0, legend=legend)
@@ -99,6 +101,8 @@ def test_a_legend_fits_films_of_any_aspect_and_leaves_the_panel(width, height):
     changed, panel = ((plain != explained).any(2), plain.any(2))
     assert not (changed & panel).any() and changed.sum() > 0.7 * panel.sum()
     assert not changed[-1].any() and not changed[:, -1].any()
+    rows, of_panel = (np.flatnonzero(one.any(1)) for one in (changed, panel))
+    assert (rows[-1] <= of_panel[-1]) == beside  # then it covers no further rows, where people are
 
 
 def test_nothing_is_drawn_until_a_browser_is_there_and_then_the_newest(log):

@@ -29,12 +29,11 @@ _STATUS = {
     TrackStatus.AMBIGUOUS: (60, 200, 250),
     TrackStatus.LOST: (70, 70, 240),
 }
-_LEGEND = (
-    ("Dial: phase of the stride, top: right heel strike", None),
-    ("Its coloured arc: 95 % interval of the phase", None),
-    ("Ellipses: 90 % regions of wrists and ankles", None),
-    ("Left side of the body", "left"),
-    ("Right side of the body", "right"),
+_LEGEND = (  # short enough to fit beside the panel in a picture of 320 columns; side of each part of a line
+    (("Dial: phase, top: right heel strike", None),),
+    (("Arc: its 95 % interval", None),),
+    (("Ellipses: 90 % regions", None),),
+    (("Left side", "left"), ("Right side", "right")),
 )
 LEGEND_SECONDS = 3.0
 """Seconds for which a film explains dial, ellipses and colours."""
@@ -91,15 +90,22 @@ def _lines(region: Image, words: tuple[str, ...], colour: tuple[int, int, int], 
 def _draw_legend(canvas: Image, scale: float) -> None:
     """Explain dial, ellipses and colours in the top right corner, or below the panel if it reaches there."""
     size, edge, row = 0.4 * scale, round(8 * scale), 19 * scale
-    width = max(cv2.getTextSize(words, _FONT, size, 1)[0][0] for words, _ in _LEGEND) + round(16 * scale)
+
+    def width_of(words: str) -> int:
+        return int(cv2.getTextSize(words, _FONT, size, 1)[0][0])
+
+    width = max(width_of("  ".join(words for words, _ in line)) for line in _LEGEND) + 2 * edge
     height = round(row * len(_LEGEND) + 8 * scale)
     left, top = canvas.shape[1] - edge - width, edge
     if left < round(_PANEL_SIZE[0] * scale) + 2 * edge:
         left, top = edge, round(_PANEL_SIZE[1] * scale) + 2 * edge
     region = _darkened(canvas[top : top + height, left : left + width])
-    for k, (words, side) in enumerate(_LEGEND):
-        colour = OVER_PICTURES[side] if side else _INK
-        _write(region, words, (round(8 * scale), round(row * (k + 0.8))), size, colour)
+    for k, line in enumerate(_LEGEND):
+        at = edge
+        for words, side in line:
+            colour = OVER_PICTURES[side] if side else _INK
+            _write(region, words, (at, round(row * (k + 0.8))), size, colour)
+            at += width_of(f"{words}  ")
 
 
 def _dial(region: Image, estimate: Estimate, at: tuple[int, int], radius: float, scale: float) -> None:
