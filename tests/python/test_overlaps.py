@@ -1,14 +1,19 @@
 """Landmarks of people who overlap in the picture, with the empty scene in place of the others."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from drawn_person import write
 
-from gait.camera.camera import Camera
+from gait.camera.camera import Camera, write_camera
+from gait.camera.path import CameraPose, write_path
 from gait.detect.networks import LANDMARK_JOINTS, Crop, Person
 from gait.detect.outline import draw_person
 from gait.detect.overlaps import Overlaps, same_joints
 from gait.errors import UserError
 from gait.io.video import Frame
+from gait.track import read_scene
 from gait.track.clip_camera import static_plate
 from gait.track.options import ClipOptions
 
@@ -213,3 +218,19 @@ def test_a_camera_that_moves_has_no_empty_scene(shift, known, capsys):
     assert (static_plate(options, None, camera, samples, plate) is plate) == known
     assert ("the camera moves: people who overlap" in capsys.readouterr().err) != known
     assert static_plate(options, None, camera, samples, None) is None
+    assert "there is no background: people who overlap" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("people", [None, 8])
+def test_a_camera_with_given_poses_has_no_empty_scene(people, tmp_path, monkeypatch, capsys):
+    write(tmp_path / "v.mp4", [EMPTY] * 6)
+    still = Camera.looking((0.0, -6.0, 1.4), (0.0, 0.0, 0.9), (WIDTH, HEIGHT), 330.0)
+    write_camera(tmp_path / "c.json", still)
+    poses = [CameraPose.of(replace(still, t=still.t + (0.1 * k, 0.0, 0.0))) for k in range(6)]
+    write_path(tmp_path / "p.csv", range(6), poses, by_frame=True)
+    monkeypatch.setattr(read_scene, "require_detector", lambda _: None)
+    monkeypatch.setattr(read_scene, "detects", lambda _: True)
+    monkeypatch.setattr(read_scene, "find_people", lambda *_: ({}, -1))
+    files = (str(tmp_path / name) for name in ("v.mp4", "c.json", "t.csv"))
+    read_scene.read_scene(ClipOptions(*files, camera_path=str(tmp_path / "p.csv"), people=people))
+    assert ("the camera moves: people who overlap" in capsys.readouterr().err) == (people is not None)

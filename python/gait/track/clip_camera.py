@@ -95,13 +95,20 @@ def static_plate(
     options: ClipOptions, video: Video, camera: Camera | None, samples: list[Frame], plate: Image | None
 ) -> Image | None:
     """Return the empty scene if the camera stands still in the samples; otherwise None, and print a note."""
+    if plate is None:
+        note_overlaps(options, "there is no background")
     if plate is None or not samples:
         return plate
     lens = camera or expected_lens(video, options.fov, samples, {})
     if not moves(lens, samples, {}, plate):
         return plate
-    note("the camera moves: people who overlap are not found one by one", options.quiet)
+    note_overlaps(options, "the camera moves")
     return None
+
+
+def note_overlaps(options: ClipOptions, why: str) -> None:
+    """Print why people who overlap are not found one by one."""
+    note(f"{why}: people who overlap are not found one by one", options.quiet)
 
 
 def motion_remedy(options: ClipOptions, turn: float | None) -> str:

@@ -12,7 +12,13 @@ from gait.io.video import Video, background
 from gait.progress import progress, warning
 from gait.track.camera_check import contradiction
 from gait.track.clip_background import require_background, sample
-from gait.track.clip_camera import calibrate_clip, camera_motion, given_camera, static_plate
+from gait.track.clip_camera import (
+    calibrate_clip,
+    camera_motion,
+    given_camera,
+    note_overlaps,
+    static_plate,
+)
 from gait.track.clip_keypoints import cut_to, detects, find_people, require_detector
 from gait.track.first_state import read_start, who_starts
 from gait.track.keypoint_start import keypoint_noise
@@ -51,7 +57,9 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
         if detects(options):
             # Another core computes the median of the clip while the detector runs.
             beside, empty = pool.submit(sample, options, video, poses), None
-            if options.people is not None and not poses:
+            if options.people is not None and poses:
+                note_overlaps(options, "the camera moves")
+            elif options.people is not None:
                 samples, plate = beside.result()
                 empty = static_plate(options, video, camera, samples, plate if given is None else given)
             people, person = find_people(options, video, model, frames, empty)
