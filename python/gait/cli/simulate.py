@@ -94,7 +94,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--people",
         choices=COMPANY,
-        help="a second person comes the other way, three walk abreast, or a faster person overtakes",
+        help="a second person comes the other way, three walk abreast, or a faster person overtakes; "
+        "--stature, --speed, --asymmetry and --aid are those of the first",
     )
     add(
         "--cameras",

@@ -22,6 +22,12 @@ Several films of the same walk from static cameras locate the person much better
 frames of the first film, which also gives the start; the nearest frames in time of the others are used.
 Their time offsets are estimated from the person's motion unless --offsets gives them.
 
+--people tracks several people, each with a separate tracker.  They are numbered from 1 in the order in which
+they are in view longest and appear tallest: in the names of each person's files (OUT-1.csv, OUT-2.csv), in
+the column person, in --json and above the heads in the overlay.  People found but not tracked have no number;
+the command states when and where they are in view.  --height is the stature of the person in view longest and
+tallest or, without --camera, of the first in that order whose walk determines the camera.
+
 --keypoints adds joints that a detector has found in the frames, in the formats that gait lift reads.  Joints
 that the model does not have are ignored; frames may be missing.
 
@@ -50,6 +56,7 @@ examples:
   gait track walk.mp4 --camera camera.json --init init.json --background empty.png --height 1.75 \\
       -o track.csv --overlay overlay.mp4
   gait track walk.mp4 --camera camera.json -o track.csv --report run.html
+  gait track walk.mp4 --camera camera.json --people all -o track.csv --overlay everyone.mp4
   gait track left.mp4 right.mp4 --camera calibration.toml -o track.csv
   gait track walk.mp4 --camera camera.json -o track.csv --smooth --draws draws.npz
 """
@@ -126,10 +133,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--people",
         type=_people,
-        metavar="N",
-        help="track several people: all who walk, or the N (up to 8) in view longest and tallest. They are "
-        "numbered from 1 in that order: in the names of each person's files (OUT-1.csv, OUT-2.csv), in the "
-        "column person, and above the heads in the overlay",
+        metavar="N|all",
+        help="track several people: all who walk, or the N (up to 8) in view longest and tallest",
     )
     add(
         "--keypoints-sd",

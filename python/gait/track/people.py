@@ -47,7 +47,8 @@ Estimates = dict[int, Estimate]
 def track_people(options: ClipOptions) -> dict[str, Any]:
     """Track everyone who walks, at most `options.people`; return the figures of ``gait track --json``.
 
-    Files are written for each person, with the person's number in their names; the overlay shows all.
+    People are numbered from 1.  Files are written for each, with the number in their names; the overlay shows
+    all.
 
     Raises
     ------
