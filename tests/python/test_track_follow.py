@@ -336,6 +336,32 @@ def test_a_track_that_goes_astray_backwards_is_cut_and_the_person_searched_earli
     assert all(near[:35])
 
 
+class Stops(Script):
+    """A tracker of a person who stands from frame 20 on, and who shows left and right only from frame 60 on."""
+
+    def like(self, config):
+        return Stops(self.estimate, self.leaves, self.starts)
+
+    def step(self, image, utime, keypoints, poses, backgrounds, people):
+        number = round(abs(utime) * 30 / 1e6)
+        now = super().step(image, utime, keypoints, poses, backgrounds, people)
+        known = TrackStatus.TRACKING if number >= 20 and not 50 <= number < 60 else TrackStatus.AMBIGUOUS
+        return replace(now, status=known, speed=0.0 if 20 <= number < 50 else 1.2)
+
+
+@pytest.mark.parametrize(("frames", "wanted"), [(50, [0]), (100, [-66, 20])])
+def test_a_stand_does_not_show_which_leg_is_the_right_one(estimate, frames, wanted):
+    """A start without a phase is moved to where the person walks with status `tracking`, not to a stand."""
+    people = PersonKeypoints(camera(), {1: {n: found() for n in range(100)}}, 1)
+    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS)
+    starts = []
+    follower = Follower(Stops(estimate, -1, starts), Film(), people, plausible, lambda *_: None, one_pass=True)
+    start = Start(0, estimate.mean, replace(estimate.sd, phase=0.5))
+    rows = list(follower.follow(start, range(frames)))
+    assert starts == [0, 0, 0, *wanted]  # three draws of particles first; a negative one is backwards
+    assert [frame.number for frame, _ in rows] == list(range(wanted[-1], frames))
+
+
 def test_legs_that_keypoints_show_elsewhere_are_no_agreement(estimate):
     legs = [i for i, name in enumerate(MODEL.joint_names) if name[2:] in ("knee", "ankle")]
     astride = JOINTS[-1].copy()

@@ -156,8 +156,9 @@ class Follower:
         return found
 
     def _decided(self, tracker: Tracker, start: Start, frames: Iterator[tuple[Frame, int]]) -> Start | None:
-        """Return a start where a tracker has been `tracking` for a while; None if it is not soon.
+        """Return a start where a tracker has been `tracking` strides for a while; None if it is not soon.
 
+        Standing shows neither the phase nor which leg is the right one.
         `frames`: with the tracker's time of each, microseconds.
         """
         now: Estimate | None = None
@@ -167,7 +168,7 @@ class Follower:
                 self._start(tracker, start, utime)
                 since = begun = frame.time
             now = self._step(tracker, frame, utime, now)
-            if now.status != TrackStatus.TRACKING:
+            if now.status != TrackStatus.TRACKING or not now.takes_strides:
                 since = frame.time
             if abs(frame.time - since) >= _SETTLED_S:
                 return _start_from(now, frame.number, start)
