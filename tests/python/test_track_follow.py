@@ -337,7 +337,7 @@ def test_a_track_that_goes_astray_backwards_is_cut_and_the_person_searched_earli
 
 
 class Stops(Script):
-    """A tracker of a person who stands from frame 20 on, and who shows left and right only from frame 60 on."""
+    """A tracker of a person who stands from frame 20 to 49, and shows left and right from frame 60 on."""
 
     def like(self, config):
         return Stops(self.estimate, self.leaves, self.starts)
@@ -355,7 +355,9 @@ def test_a_stand_does_not_show_which_leg_is_the_right_one(estimate, frames, want
     people = PersonKeypoints(camera(), {1: {n: found() for n in range(100)}}, 1)
     plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS)
     starts = []
-    follower = Follower(Stops(estimate, -1, starts), Film(), people, plausible, lambda *_: None, one_pass=True)
+    follower = Follower(
+        Stops(estimate, -1, starts), Film(), people, plausible, lambda *_: None, one_pass=True
+    )
     start = Start(0, estimate.mean, replace(estimate.sd, phase=0.5))
     rows = list(follower.follow(start, range(frames)))
     assert starts == [0, 0, 0, *wanted]  # three draws of particles first; a negative one is backwards
