@@ -53,10 +53,11 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
     given = None if options.background in ("auto", "none") else background(options.background, video)
     if given is not None:
         require_background(options, video, camera, model, given, first)
+    empty = None
     with ThreadPoolExecutor(1) as pool:
         if detects(options):
             # Another core computes the median of the clip while the detector runs.
-            beside, empty = pool.submit(sample, options, video, poses), None
+            beside = pool.submit(sample, options, video, poses)
             if options.people is not None and poses:
                 note_overlaps(options, "the camera moves")
             elif options.people is not None:
@@ -65,7 +66,7 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
             people, person = find_people(options, video, model, frames, empty)
             samples, plate = beside.result()
         else:
-            people, person = find_people(options, video, model, frames, None)
+            people, person = find_people(options, video, model, frames, empty)
             with progress("background", video.count, options.quiet) as update:
                 samples, plate = sample(options, video, poses, update)
     longer = people
