@@ -157,6 +157,19 @@ def test_a_new_person_is_known_by_colours_without_the_clothes_of_one_found_in_fr
     assert people._alike(one.colours, red) > 0.95 > people._alike(mixed, red)
 
 
+@pytest.mark.parametrize("empty", [None, np.zeros((200, 640, 3), np.uint8)])
+def test_where_someone_hidden_is_expected_no_one_else_gets_a_number(stage, empty):
+    """Joints found there may be of two people, so their colours may be no one's."""
+    stage.detector = people.PeopleDetector(everyone=True, empty=empty)
+    for n in range(20):
+        stage.step(n, red=220 + 4 * n, blue=300)
+    for n in range(20, 50):
+        assert 3 not in stage.step(n, blue2=340, blue=300)
+    for n in range(50, 130):
+        found = stage.step(n, blue2=340, blue=300)
+    assert found == {2: pytest.approx(300), 3: pytest.approx(340)}
+
+
 @pytest.mark.parametrize(("first", "shift", "taken"), [(0, 14.0, True), (0, 60.0, False), (9, 60.0, True)])
 def test_a_person_found_again_beside_a_new_one_stays_on_the_course(stage, monkeypatch, first, shift, taken):
     """If there is a course."""
@@ -179,7 +192,7 @@ def test_one_whose_trunk_is_hidden_gets_an_old_id_only_soon_after(stage, seconds
     one, other, frame, person = followed(stage, 0, red=200, blue=500)
     one.lost = True
     frame = frame._replace(time=one.times[-1] + seconds)
-    assert (stage.detector._who(frame, person, np.ones((200, 640), bool)) is one) == same
+    assert (stage.detector._who(frame, person, np.ones((200, 640), bool), []) is one) == same
 
 
 def test_the_course_of_someone_near_another_goes_on_while_most_of_them_is_in_view(stage):

@@ -284,10 +284,15 @@ class PeopleDetector:
         """Predict the crops of people hidden by those found, if the empty scene is known."""
         if self._overlaps is None:
             return []
-        lost = [
-            one.expected(time) for one in self.people if one.lost and time - one.times[-1] < _LONGEST_HIDDEN
-        ]
-        return [crop for crop in lost if any(_apart(crop, p.crop) < _MAY_HIDE for _, p in found)]
+        return [one.expected(time) for one in self.people if self._is_behind(one, found, time)]
+
+    @staticmethod
+    def _is_behind(one: Followed, found: list[tuple[Followed, Person]], time: float) -> bool:
+        """Whether a person lost of late may be hidden by those found."""
+        if not one.lost or time - one.times[-1] >= _LONGEST_HIDDEN:
+            return False
+        crop = one.expected(time)
+        return any(_apart(crop, p.crop) < _MAY_HIDE for _, p in found)
 
     def _same(self, a: Person, b: Person) -> bool:
         """Whether two sets of landmarks are of the same person; those of two who overlap differ in joints."""
@@ -371,7 +376,9 @@ class PeopleDetector:
                 continue
             again, new = more
             hidden = self._hidden_by(again, new)
-            one = self._who(frame, new, hidden)
+            one = self._who(frame, new, hidden, found)
+            if one is None:
+                continue
             self._add(one, frame, new, [], hidden)
             found.append((one, new))
             self._replace(frame, found, again)
@@ -433,20 +440,30 @@ class PeopleDetector:
     def _just_lost(one: Followed, time: float) -> bool:
         return one.lost and time - one.times[-1] < _SCAN_PERIOD
 
-    def _who(self, frame: Frame, person: Person, hidden: Mask | None) -> Followed:
-        """Find the lost person whose position and colours match, or create a new one."""
+    def _who(
+        self, frame: Frame, person: Person, hidden: Mask | None, found: list[tuple[Followed, Person]]
+    ) -> Followed | None:
+        """Find the lost person whose position and colours match, or create a new one.
+
+        None if someone hidden by those found is expected there, in other colours: the joints may be of both.
+        """
         colours = _colours(frame.image, person, hidden)
-        best, least = None, np.inf
+        best, least, expected = None, np.inf, False
         for one in self.people:
             gap, alike = frame.time - one.times[-1], _alike(colours, one.colours)
-            longest = _LONGEST_HIDDEN if colours is None or one.colours is None else _FORGET
-            if not one.lost or gap > longest or alike < _COLOUR_OVERLAP:
+            if not one.lost or gap > _FORGET:
                 continue
             reach = _SAME_CROP + _CROP_SPEED * gap
             stayed = _apart(person.crop, one.keypoints[-1].crop) / reach
             off = min(one.off_course(frame.time, person) / reach, 0.5 + 0.5 * stayed)  # few people stop
-            if off < 1 and off - alike < least:
-                best, least = one, off - alike
+            known = colours is not None and one.colours is not None
+            if off < 1 and alike >= _COLOUR_OVERLAP and (known or gap <= _LONGEST_HIDDEN):
+                if off - alike < least:
+                    best, least = one, off - alike
+            elif off < 1 and self._is_behind(one, found, frame.time):
+                expected = True
+        if best is None and expected:
+            return None
         if best is None:
             best = Followed(next(self._ids))
             self.people.append(best)
