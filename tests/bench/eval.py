@@ -73,6 +73,14 @@ def arguments() -> argparse.Namespace:
     )
     add("--every", type=int, nargs="+", default=[], metavar="K", help="also with every K-th frame only")
     add("--particles", type=int, nargs="+", default=[], metavar="N", help="also with N particles")
+    add(
+        "--rejuvenation",
+        type=float,
+        nargs="+",
+        default=[],
+        metavar="S",
+        help="--particles also with these times",
+    )
     add("--ablate", action="store_true", help="also with each term and feature switched off in turn")
     add("--all", action="store_true", help="--stature-error 0.05 --background none --every 2 3")
     add("--against", type=Path, metavar="JSON", help="results.json of an earlier run: print what changed")
@@ -99,6 +107,7 @@ def arms_of(args: argparse.Namespace) -> list[Arm]:
         backgrounds=args.background,
         every=args.every,
         particles=args.particles,
+        rejuvenation=args.rejuvenation,
         switches=switches,
     )
 
@@ -171,7 +180,9 @@ def tables(
     parts.append(("Intervals and status", shape(eval_table.honesty(summaries), 2)))
     by_particles = eval_table.by_particles(rows, TrackerConfig.default().particles)
     if len(by_particles) > 1:
-        parts.append(("Errors and time by number of particles", shape(by_particles, 0)))
+        parts.append(("Errors and time by number of particles", shape(by_particles, 1)))
+        times = eval_table.time_to_error(rows, TrackerConfig.default().particles)
+        parts.append(("Time of a step with which an error is reached", shape(times, 1)))
     costs = eval_ablate.costs(rows)
     if costs:
         parts.append(

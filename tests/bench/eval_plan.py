@@ -134,7 +134,8 @@ def varied_arms(
     stature_error: float | None = None,
     backgrounds: Iterable[str] = (),
     every: Iterable[int] = (),
-    particles: Iterable[int] = (),
+    particles: Sequence[int] = (),
+    rejuvenation: Iterable[float] = (),
     switches: dict[str, dict[str, Any]] | None = None,
 ) -> list[Arm]:
     """Default mode from the truth, with one difference in each arm.
@@ -146,6 +147,8 @@ def varied_arms(
         Two arms: the start's stature too large and too small by this share.
     backgrounds, every, particles
         An arm for each value.
+    rejuvenation
+        Seconds; an arm for each, with each of `particles`.
     switches : dict
         Name of an ablation: the settings that switch its feature off.
     """
@@ -157,6 +160,9 @@ def varied_arms(
     arms += [Arm(f"background {b}", background=b, seeds=seeds) for b in backgrounds if b != "plate"]
     arms += [Arm(f"every {k}", every=k, seeds=seeds) for k in every if k != 1]
     arms += [Arm(f"N {n}", seeds=seeds, changes=(("particles", n),)) for n in particles]
+    for time in rejuvenation:
+        settings = [(("particles", n), ("rejuvenation_time", time)) for n in particles]
+        arms += [Arm(f"N {s[0][1]}, rejuvenation {time:g} s", seeds=seeds, changes=s) for s in settings]
     arms += [
         Arm(f"no {name}", seeds=seeds, changes=tuple(values.items()))
         for name, values in (switches or {}).items()

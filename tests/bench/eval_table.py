@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -200,25 +201,60 @@ def by_particles(rows: list[dict[str, Any]], default: int) -> list[list[str]]:
     shown = {"root mm": ("root_mm", 1), "abs mm": ("abs_mm", 0), "in 90 %": ("cover90", 3)}
     shown |= {"CRPS mm": ("crps_mm", 1), "px": ("px", 2), "ms": ("step_ms", 1)}
     lines = [["particles", "runs", *shown]]
-    arms = {row["arm"]: int(row["arm"][2:]) for row in rows if row["arm"].startswith("N ")}
-    if arms:
-        arms[BASE] = default
-    for arm, count in sorted(arms.items(), key=lambda item: item[1]):
-        runs = [row for row in rows if row["arm"] == arm and row["root_mm"] is not None]
-        if runs:
-            means = [_over_clips(runs, name, decimals) for name, decimals in shown.values()]
-            lines.append([str(count), str(len(runs)), *means])
+    for name, runs in _runs_by_particles(rows, default).items():
+        means = [_over_clips(runs, name, decimals) for name, decimals in shown.values()]
+        lines.append([name, str(len(runs)), *means])
     return lines
 
 
+def time_to_error(rows: list[dict[str, Any]], default: int) -> list[list[str]]:
+    """Head and lines of the least time of a step, and its particles, with which an error is reached.
+
+    Errors and times are means as in `by_particles`.
+    """
+    lines = [["error", "at most mm", "ms", "particles"]]
+    arms = _runs_by_particles(rows, default)
+    for what, measure, step in (("root", "root_mm", 1), ("abs", "abs_mm", 5)):
+        errors = {name: _mean(runs, measure) for name, runs in arms.items()}
+        times = {name: _mean(runs, "step_ms") for name, runs in arms.items()}
+        if errors:
+            least, most = (step * math.ceil(of(errors.values()) / step) for of in (min, max))
+            for bound in range(least, most + 1, step):
+                name = min((name for name in arms if errors[name] <= bound), key=times.__getitem__)
+                lines.append([what, str(bound), f"{times[name]:.1f}", name])
+    return lines
+
+
+def _runs_by_particles(rows: list[dict[str, Any]], default: int) -> dict[str, list[dict[str, Any]]]:
+    """Runs on clips with true joints by number of particles; empty if that was not varied."""
+    names = {arm: arm[2:] for arm in dict.fromkeys(row["arm"] for row in rows) if arm.startswith("N ")}
+    if names:
+        names[BASE] = str(default)
+    found = {
+        name: [row for row in rows if row["arm"] == arm and row["root_mm"] is not None]
+        for arm, name in sorted(names.items(), key=lambda item: int(item[1].split(",")[0]))
+    }
+    return {name: runs for name, runs in found.items() if runs}
+
+
 def _over_clips(runs: list[dict[str, Any]], name: str, decimals: int) -> str:
-    names = dict.fromkeys(row["clip"] for row in runs)
-    clips = [[row[name] for row in runs if row["clip"] == clip] for clip in names]
-    mean = np.mean([np.mean(values) for values in clips])
+    clips, mean = _by_clip(runs, name), _mean(runs, name)
     if any(len(values) < 2 for values in clips):
         return f"{mean:.{decimals}f}"
     error = np.sqrt(sum(np.var(values, ddof=1) / len(values) for values in clips)) / len(clips)
     return f"{mean:.{decimals}f} +- {error:.{decimals}f}"
+
+
+def _mean(runs: list[dict[str, Any]], name: str) -> float:
+    """Mean over the clips of the means over their seeds."""
+    return float(np.mean([np.mean(values) for values in _by_clip(runs, name)]))
+
+
+def _by_clip(runs: list[dict[str, Any]], name: str) -> list[list[float]]:
+    return [
+        [row[name] for row in runs if row["clip"] == clip]
+        for clip in dict.fromkeys(row["clip"] for row in runs)
+    ]
 
 
 def honesty(rows: list[dict[str, Any]]) -> list[list[str]]:

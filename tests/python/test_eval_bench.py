@@ -184,6 +184,18 @@ def test_errors_and_time_by_number_of_particles_are_means_over_clips():
     assert (many["particles"], many["root mm"], many["ms"]) == ("2000", "30.0 +- 1.0", "3.0 +- 0.0")
 
 
+def test_the_time_to_an_error_is_that_of_the_fastest_run_that_reaches_it():
+    arms = {"default/truth": (3.0, 30.5), "N 500": (1.0, 32.0), "N 500, rejuvenation 1.5 s": (0.9, 33.0)}
+    rows = [row("a", 1, arm, step_ms=ms, root_mm=mm, abs_mm=60.0) for arm, (ms, mm) in arms.items()]
+    assert eval_table.time_to_error(rows, 2000)[1:] == [
+        ["root", "31", "3.0", "2000"],
+        ["root", "32", "1.0", "500"],
+        ["root", "33", "0.9", "500, rejuvenation 1.5 s"],
+        ["abs", "60", "0.9", "500, rejuvenation 1.5 s"],
+    ]
+    assert len(eval_table.time_to_error(rows[:1], 2000)) == 1  # nothing was varied
+
+
 def test_switches_turn_off_what_is_on():
     config = TrackerConfig.default()
     found = eval_ablate.switches(config)
@@ -197,10 +209,17 @@ def test_switches_turn_off_what_is_on():
 
 def test_arms_vary_one_thing_each():
     arms = eval_plan.varied_arms(
-        seeds=2, stature_error=0.05, backgrounds=["none", "plate"], every=[1, 3], particles=[300]
+        seeds=2,
+        stature_error=0.05,
+        backgrounds=["none", "plate"],
+        every=[1, 3],
+        particles=[300],
+        rejuvenation=[1.5],
     )
-    assert [a.name for a in arms] == ["stature +5 %", "stature -5 %", "background none", "every 3", "N 300"]
-    assert {a.seeds for a in arms} == {2} and arms[-1].changes == (("particles", 300),)
+    few = ["N 300", "N 300, rejuvenation 1.5 s"]
+    assert [a.name for a in arms] == ["stature +5 %", "stature -5 %", "background none", "every 3", *few]
+    assert {a.seeds for a in arms} == {2} and arms[-2].changes == (("particles", 300),)
+    assert arms[-1].changes == (("particles", 300), ("rejuvenation_time", 1.5))
     assert [a.seeds for a in eval_plan.main_arms(["default", "paper"], ["auto"], None)] == [4, 3]
 
 
