@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gait import Camera, Model, Video, cli
-from gait.detect import networks, people, weights
+from gait.detect import clothes, networks, people, weights
 from gait.detect.networks import LANDMARK_JOINTS, Crop, Person
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints, read
@@ -22,7 +22,7 @@ class Stage:
     """People as rectangles of colour, and the two networks that see them exactly."""
 
     def __init__(self, monkeypatch):
-        self.places, self.reach = {}, 60
+        self.places, self.reach, self.depth = {}, 60, 1.0
         monkeypatch.setattr(
             people, "PersonNetwork", lambda: lambda image, small: [list(map(self.crop, self.visible()))]
         )
@@ -45,7 +45,7 @@ class Stage:
             part = float((image[own] > 0).any(axis=1).sum() / self.area)
             off = abs(place - crop.centre[0])
             if part > 0.3 and off <= self.reach and part - off / 120 > most:
-                best, most = self.person(place, nearer), part - off / 120
+                best, most = self.person(place, self.depth * nearer), part - off / 120
         return best or Person(0.1, np.zeros((16, 2)), np.zeros(16), crop)
 
     def person(self, place, nearer=0.0):
@@ -116,9 +116,10 @@ def followed(stage, number, **places):
 def test_a_neighbour_of_unknown_colours_makes_no_one_strange(stage):
     one, other, frame, person = followed(stage, 0, red=200, blue=260)
     other.colours = None
-    one.colours = 0.6 * one.colours + 0.4 * people._colours(frame.image, other.keypoints[-1], None)  # of both
+    others = clothes.colours_of(frame.image, other.keypoints[-1], None)
+    one.colours = 0.6 * one.colours + 0.4 * others
     assert not stage.detector._strange(one, frame, person, [other], None)
-    other.colours = people._colours(frame.image, person, None)
+    other.colours = clothes.colours_of(frame.image, person, None)
     assert stage.detector._strange(one, frame, person, [other], None)
 
 
@@ -134,7 +135,7 @@ def test_colours_distinguish_a_person_from_a_lost_one_but_not_from_one_behind(st
     assert stage.detector._strange(one, frame, person, [other], hidden(person.uv, [person.uv + (30, 1)]))
     other.lost = True
     assert stage.detector._strange(one, frame, person, [other], None)
-    own = people._colours(frame.image, person, None)
+    own = clothes.colours_of(frame.image, person, None)
     one.colours, other.colours = 0.5 * (one.colours + own), own  # in sun and shade, and in similar clothes
     assert not stage.detector._strange(one, frame, person, [other], None)
 
@@ -153,8 +154,44 @@ def test_a_new_person_is_known_by_colours_without_the_clothes_of_one_found_in_fr
     )
     assert stage.detector._add_new(frame, found, [front.crop])
     stage.step(2, red=200)
-    red = people._colours(stage.image, behind, None)
-    assert people._alike(one.colours, red) > 0.95 > people._alike(mixed, red)
+    red = clothes.colours_of(stage.image, behind, None)
+    assert clothes.alike(one.colours, red) > 0.95 > clothes.alike(mixed, red)
+
+
+@pytest.mark.parametrize(("depth", "swapped"), [(12.0, False), (1.0, True)])
+def test_ids_swapped_where_two_people_met_are_swapped_back(stage, depth, swapped):
+    """If their feet differ; both wear red."""
+    stage.depth = depth
+    stage.detector = people.PeopleDetector(everyone=True, empty=np.zeros((200, 640, 3), np.uint8))
+    for n in range(61):
+        stage.step(n, red=220 + 2 * n, red2=300)
+    one, other = stage.detector.people
+    people._swap(one, other, 57)
+    for n in range(61, 80):
+        stage.step(n, red=220 + 2 * n, red2=300)
+    assert one.frames[-15:] == other.frames[-15:] == list(range(65, 80))
+    for n in range(-15, 0):
+        places = [who.keypoints[n].uv[:, 0].mean() for who in (one, other)]
+        assert places == ([300, 380 + 2 * n] if swapped else [380 + 2 * n, 300])
+
+
+def test_clothes_show_whether_two_people_are_swapped(stage):
+    one, other, frame, person = followed(stage, 0, red=200, blue=260)
+    second = other.keypoints[-1]
+    assert people.PeopleDetector._swap_gain(frame, (one, second), (other, person)) == people._MOST_GAIN
+    assert people.PeopleDetector._swap_gain(frame, (one, person), (other, second)) == -people._MOST_GAIN
+    one.colours = None
+    assert abs(people.PeopleDetector._swap_gain(frame, (one, second), (other, person))) < 0.1
+
+
+def test_a_live_detector_forgets_who_met(stage):
+    stage.detector = people.PeopleDetector(live=True)
+    for n in range(30):
+        stage.step(n, red=220 + 4 * n, blue=300)
+    assert stage.detector._met
+    stage.step(round(25 * people._FORGET) + 31, blue=300)
+    stage.step(round(25 * people._FORGET) + 32, blue=300)
+    assert not stage.detector._met
 
 
 @pytest.mark.parametrize("empty", [None, np.zeros((200, 640, 3), np.uint8)])

@@ -7,7 +7,8 @@ wanted, it searches small parts too, and beside people found, but once a second 
 
 People who meet in the picture are distinguished by their courses and the colours of their clothes: while two
 are near each other, landmarks off a person's course belong to another person, and the person counts as
-hidden. A person who comes back gets the old id if position and colours agree.
+hidden. A person who comes back gets the old id if position and colours agree. If, after two people met, the
+colours and feet of each agree better with the other for some frames, their ids are swapped.
 
 If the empty scene is known, the landmarks of people who overlap are found one by one, without the others
 (`gait.detect.overlaps`), and a person hidden by another is looked for in every frame.
@@ -19,12 +20,12 @@ import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gait.counts import count_of
 from gait.detect import profile
+from gait.detect.clothes import Colours, alike, colours_of
 from gait.detect.networks import (
     LANDMARK_JOINTS,
     LEAST_SCORE,
@@ -40,8 +41,6 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame, Image, Video
 
 Array = NDArray[np.float64]
-Colours = NDArray[np.float32]
-"""Histogram of lightness and hue of the clothes on the trunk, shape `_BINS`, sum 1."""
 
 _SCAN_PERIOD = 1.0  # seconds between scans of the whole picture
 _RETRY = 0.2  # the same while a person is lost or none has been found, and after one was found
@@ -55,7 +54,6 @@ _MAY_HIDE = 0.5  # crop sides from a person within which they may hide another
 _LONGEST_HIDDEN = 2.0  # seconds for which a hidden person is looked for in every frame
 _CLEAR = 0.7  # share of a person's area that others leave in view, with which they are on their own course
 _FRONT = 0.95  # the same of a person in front of the others
-_LEAST_TRUNK = 0.3  # share of the trunk that must be in view to know its colours
 _COURSE = 0.3  # seconds from which the speed on a course is computed
 _CONTACT = 0.35  # crop sides; people closer than this may be mistaken for each other
 _LONG_CONTACT = 1.0  # seconds, after which people walk together and their courses are computed afresh
@@ -66,14 +64,15 @@ _OFF_COURSE = (
 #: Overlap of the colours of one person; 5 % of the frames of a film in sun and shade have less.
 _COLOUR_OVERLAP = 0.6
 _CLEAR_OVERLAP_GAIN = 0.1  # by which the overlap with another person's colours must be larger
+_TRUNKS_APART = 0.1  # crop sides from which the trunks of two people do not overlap
+_STANCE = 0.25  # seconds within which a foot is on the ground
+_FEET = 3.0  # weight of a difference of feet in crop sides, beside that of overlaps of colours
+_MOST_GAIN = 0.4  # by one frame, of what swapping two ids gains
+_SURELY_SWAPPED = 1.0  # sum of gains from which ids are swapped
 _MOST_PEOPLE = 8  # people
 _LEAST_FRAMES = 3  # frames in which a person must be found
 _LEAST_FEET = 0.3  # seconds for which both ankles must be in view where feet are needed
-_BINS = (6, 12, 12)  # of L, a and b
-_RANGES = (0, 256, 80, 176, 80, 176)
-_BLUR = [0.5 * np.eye(n) + 0.25 * (np.eye(n, k=1) + np.eye(n, k=-1)) for n in _BINS]
 _SAMPLE = 5  # frames between samples of colours
-_TORSO = [list(LANDMARK_JOINTS).index(name) for name in ("l_shoulder", "r_shoulder", "r_hip", "l_hip")]
 
 
 @dataclass
@@ -96,6 +95,8 @@ class Followed:
     free: int = 0
     """Index of the last frame in which no other person was near, or hid them."""
     lost: bool = False
+    foot: float | None = None
+    """The same as `foot_of_late` before another person met this one."""
 
     def expected(self, time: float) -> Crop:
         """Predict the crop at a time from the speed of the last two frames, or, if lost, of the course."""
@@ -115,6 +116,11 @@ class Followed:
             return centre
         speed = (centre - since) / (self.times[free] - self.times[begin])
         return np.asarray(centre + (time - self.times[free]) * speed)
+
+    def foot_of_late(self) -> float:
+        """Row of the lowest foot within the last stance, pixels."""
+        rows = zip(self.times, self.keypoints, strict=True)
+        return max(nearness(person.uv)[0] for at, person in rows if self.times[-1] - at <= _STANCE)
 
     def _course_begin(self) -> int:
         """Index of the first frame from which the speed on the course is computed."""
@@ -195,6 +201,8 @@ class PeopleDetector:
         self._ids = itertools.count(1)
         self._scanned = self._scanned_for_all = -np.inf
         self._searched = 0  # sizes of parts that the last scan had searched when it found someone new
+        #: Of two people near each other who may be swapped since a frame, the frame and how sure it is.
+        self._met: dict[frozenset[int], tuple[int, float]] = {}
         self.people: list[Followed] = []
 
     def step(self, frame: Frame) -> list[tuple[Followed, Person]]:
@@ -230,10 +238,13 @@ class PeopleDetector:
         if since >= (_RETRY if missing else _SCAN_PERIOD):
             self._scanned = frame.time
             self._searched = self._scan(frame, found)
+        self._undo_swaps(frame, found)
         if self._live:
             for one, _ in found:
                 one.forget()
             self.people = [one for one in self.people if frame.time - one.times[-1] <= _FORGET]
+            ids = {one.id for one in self.people}
+            self._met = {pair: swapped for pair, swapped in self._met.items() if pair <= ids}
         return found
 
     def keypoints(self, times: Mapping[int, float] | Array, correct: bool = True) -> dict[int, Keypoints]:
@@ -256,6 +267,48 @@ class PeopleDetector:
         if not correct:
             return people
         return {id: profile.corrected(found, self._network) for id, found in people.items()}
+
+    def _undo_swaps(self, frame: Frame, found: list[tuple[Followed, Person]]) -> None:
+        """Swap the ids of two people who met, if clothes and feet show for some frames that they are wrong.
+
+        This begins after the last frame in which both were found and nothing showed it.
+        """
+        meet: set[int] = set()
+        for i, j in itertools.combinations(range(len(found)), 2):
+            (one, a), (other, b) = found[i], found[j]
+            pair, apart = _pair(one, other), _apart(a.crop, b.crop)
+            if apart >= _CONTACT:
+                self._met.pop(pair, None)
+            elif apart < _TRUNKS_APART or pair in self._met:
+                meet |= pair
+                since, sure = self._met.get(pair, (frame.number, 0.0))
+                if apart >= _TRUNKS_APART:
+                    sure = max(sure + self._swap_gain(frame, found[i], found[j]), 0.0)
+                self._met[pair] = (since if sure > 0 else frame.number, sure)
+                if sure >= _SURELY_SWAPPED:
+                    _swap(one, other, since)
+                    found[i], found[j] = (one, b), (other, a)
+                    self._met[pair] = (frame.number, 0.0)
+        for one, _ in found:
+            lost = [other for other in self._others_near(one, frame.time) if other.lost]
+            for other in lost:
+                self._met.setdefault(_pair(one, other), (other.frames[-1], 0.0))
+            if not lost and one.id not in meet:
+                one.foot = one.foot_of_late()
+
+    @staticmethod
+    def _swap_gain(frame: Frame, first: tuple[Followed, Person], second: tuple[Followed, Person]) -> float:
+        """How much better the clothes and feet of two people in a frame agree with swapped ids."""
+        (one, a), (other, b) = first, second
+        gain = 0.0
+        if one.colours is not None and other.colours is not None:
+            of_a, of_b = colours_of(frame.image, a, None), colours_of(frame.image, b, None)
+            gain += alike(of_a, other.colours) - alike(of_a, one.colours)
+            gain += alike(of_b, one.colours) - alike(of_b, other.colours)
+        if one.foot is not None and other.foot is not None:
+            known, seen = one.foot - other.foot, nearness(a.uv)[0] - nearness(b.uv)[0]
+            gain += _FEET * (abs(seen - known) - abs(seen + known)) / min(a.crop.side, b.crop.side)
+        return float(np.clip(gain, -_MOST_GAIN, _MOST_GAIN))
 
     def _located(self, frame: Frame) -> list[tuple[Followed, Person, Mask | None]]:
         """Find the landmarks of everyone who is followed, and where others hide them.
@@ -320,13 +373,13 @@ class PeopleDetector:
             return False
         if near and self._in_view(person, hidden) > _FRONT:
             return off  # someone who comes out from behind may show on the trunk
-        colours = _colours(frame.image, person, hidden)
-        own = _alike(colours, one.colours)
+        colours = colours_of(frame.image, person, hidden)
+        own = alike(colours, one.colours)
         if near and self._overlaps is not None and hidden is None and own >= _COLOUR_OVERLAP:
             return off  # the others near are lost, and their clothes may be similar
         if near:
             known = [other.colours for other in near if other.colours is not None]
-            return off or any(_alike(colours, other) > own + _CLEAR_OVERLAP_GAIN for other in known)
+            return off or any(alike(colours, other) > own + _CLEAR_OVERLAP_GAIN for other in known)
         return own < _COLOUR_OVERLAP
 
     def _scan(self, frame: Frame, found: list[tuple[Followed, Person]]) -> int:
@@ -447,19 +500,19 @@ class PeopleDetector:
 
         None if someone hidden by those found is expected there, in other colours: the joints may be of both.
         """
-        colours = _colours(frame.image, person, hidden)
+        colours = colours_of(frame.image, person, hidden)
         best, least, expected = None, np.inf, False
         for one in self.people:
-            gap, alike = frame.time - one.times[-1], _alike(colours, one.colours)
+            gap, agreement = frame.time - one.times[-1], alike(colours, one.colours)
             if not one.lost or gap > _FORGET:
                 continue
             reach = _SAME_CROP + _CROP_SPEED * gap
             stayed = _apart(person.crop, one.keypoints[-1].crop) / reach
             off = min(one.off_course(frame.time, person) / reach, 0.5 + 0.5 * stayed)  # few people stop
             known = colours is not None and one.colours is not None
-            if off < 1 and alike >= _COLOUR_OVERLAP and (known or gap <= _LONGEST_HIDDEN):
-                if off - alike < least:
-                    best, least = one, off - alike
+            if off < 1 and agreement >= _COLOUR_OVERLAP and (known or gap <= _LONGEST_HIDDEN):
+                if off - agreement < least:
+                    best, least = one, off - agreement
             elif off < 1 and self._is_behind(one, found, frame.time):
                 expected = True
         if best is None and expected:
@@ -489,13 +542,14 @@ class PeopleDetector:
     @staticmethod
     def _sample_colours(one: Followed, frame: Frame, person: Person, hidden: Mask | None) -> None:
         """Add a sample to the mean of a person's colours, if their trunk is in view."""
-        colours = _colours(frame.image, person, hidden)
+        colours = colours_of(frame.image, person, hidden)
         if colours is None:
             return
         one.samples += 1
         if one.colours is None:
-            one.colours = np.zeros(_BINS, np.float32)
-        one.colours += (colours - one.colours) / np.float32(one.samples)
+            one.colours = colours
+        else:
+            one.colours = one.colours + (colours - one.colours) / np.float32(one.samples)
 
 
 def detect(
@@ -612,35 +666,20 @@ def _apart(a: Crop, b: Crop) -> float:
     return float(np.hypot(*(a.centre - b.centre)) / min(a.side, b.side))
 
 
+def _pair(one: Followed, other: Followed) -> frozenset[int]:
+    return frozenset((one.id, other.id))
+
+
+def _swap(one: Followed, other: Followed, since: int) -> None:
+    """Swap the observations of two people after a frame."""
+    first, second = (sum(number <= since for number in who.frames) for who in (one, other))
+    one.frames[first:], other.frames[second:] = other.frames[second:], one.frames[first:]
+    one.times[first:], other.times[second:] = other.times[second:], one.times[first:]
+    one.keypoints[first:], other.keypoints[second:] = other.keypoints[second:], one.keypoints[first:]
+    one.free, other.free = len(one.frames) - 1, len(other.frames) - 1
+
+
 def _beside(crop: Crop, shift: float) -> list[Crop]:
     """Make the crops of two people of the same size who walk to the left and to the right of one."""
     aside = np.array([shift * crop.side, 0.0])
     return [crop._replace(centre=crop.centre + shift) for shift in (-aside, aside)]
-
-
-def _colours(image: Image, person: Person, hidden: Mask | None) -> Colours | None:
-    """Histogram of the colours of the clothes on the trunk, blurred by one bin; None if it is hidden."""
-    hull = cv2.convexHull(person.uv[_TORSO].astype(np.int32))
-    x, y, width, height = cv2.boundingRect(hull)
-    top, left = max(y, 0), max(x, 0)
-    part = image[top : max(y + height, 0), left : max(x + width, 0)]
-    if not part.size:
-        return np.full(_BINS, 1 / np.prod(_BINS), np.float32)
-    rows, columns = part.shape[:2]
-    mask = np.zeros((rows, columns), np.uint8)
-    cv2.fillConvexPoly(mask, hull - (left, top), 255)
-    if hidden is not None:
-        whole = np.count_nonzero(mask)
-        mask[hidden[top : top + rows, left : left + columns]] = 0
-        if np.count_nonzero(mask) < _LEAST_TRUNK * whole:
-            return None
-    lab = cv2.cvtColor(part, cv2.COLOR_BGR2LAB)
-    lab[..., 1:] = np.clip(lab[..., 1:], _RANGES[2], _RANGES[3] - 1)
-    counts = cv2.calcHist([lab], [0, 1, 2], mask, list(_BINS), list(_RANGES))
-    blurred = np.einsum("lab,Ll,Aa,Bb->LAB", counts, *_BLUR, optimize=True)
-    return np.asarray(blurred / max(float(blurred.sum()), 1e-9), np.float32)
-
-
-def _alike(a: Colours | None, b: Colours | None) -> float:
-    """Overlap of two histograms (Bhattacharyya), 0 to 1; 1 if one is unknown."""
-    return 1.0 if a is None or b is None else float(np.sqrt(a * b).sum())
