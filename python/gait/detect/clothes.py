@@ -1,4 +1,4 @@
-"""Colours of people's clothes, by which people who met are told from each other."""
+"""Colours of clothes, by which people who met are distinguished."""
 
 from __future__ import annotations
 
