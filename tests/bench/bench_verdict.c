@@ -52,6 +52,19 @@ static void rate_lines(const char *what, double wanted, const bench_result *r)
          1e3 / (r->limit_ratio * LIMIT_MS), true, "fps");
 }
 
+/* A board has NEON, which is `base` there, or SSE4.1: the rates that such instructions leave a core a sixth as fast. */
+static void slow_lines(const verdict *v)
+{
+    char what[64];
+    line("    on a core a sixth as fast", 30, fps(v->usual.one) / 6, true, "fps");
+    for (int few = 0; few < 2; few++)
+        for (int k = 0; k < v->slows; k++) {
+            const bench_result *const r = v->slow[few][k];
+            snprintf(what, sizeof what, "        with %s%s", r->isa, few ? ", 500 particles" : "");
+            line(what, 30, fps(r) / 6, true, "fps");
+        }
+}
+
 /* The gain of a second thread, compared with running two independent trackers at once: on virtual machines two
  * "cores" may be hardware threads of one, which share its units and caches. */
 static void thread_lines(const by_threads *many)
@@ -106,7 +119,7 @@ static void speed_lines(const verdict *v)
     rate_lines("paper mode, 10,000 particles, one core", 30, paper->one);
     rate_lines("paper mode, 10,000 particles, two cores", 55, paper->two);
     rate_lines("default number of particles, one core", 200, v->usual.one);
-    line("    on a core a sixth as fast", 30, fps(v->usual.one) / 6, true, "fps");
+    slow_lines(v);
     line("    memory of the tracker", 2.5, (double)v->usual.one->bytes / 1e6, false, "MB");
     rate_lines("    while it searches for the phase, with twice as many", 30, v->search.one);
     thread_lines(many);

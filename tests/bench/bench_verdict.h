@@ -16,6 +16,8 @@ typedef struct verdict {
     by_threads many[2];                  /* 10,000, by mode */
     const bench_result *isa[BENCH_SETS]; /* the same with the stages, scalar first, best last */
     int isas;
+    const bench_result *slow[2][BENCH_SETS]; /* default number of particles, and 500, without the best set */
+    int slows;
     const bench_result *picture[3]; /* 640x480, 1280x720, 1920x1080 */
     double least, most;             /* particle_ratio from 1,000 to 100,000 of them */
 } verdict;
