@@ -185,15 +185,34 @@ def test_nothing_is_written_through_a_link_laid_in_the_way(tmp_path, monkeypatch
     assert victim.read_text() == "mine"
 
 
-def test_data_are_on_the_disk_before_the_name_and_the_name_before_the_end(tmp_path, monkeypatch):
+@pytest.fixture
+def recorded(tmp_path, monkeypatch):
+    """Calls that bring something to the disk, each with the file's suffix or the folder's name."""
     calls = []
-    kinds = {True: "folder", False: "file"}
-    monkeypatch.setattr(os, "fsync", lambda fd: calls.append(kinds[os.path.isdir(f"/proc/self/fd/{fd}")]))
     rename = os.replace
-    monkeypatch.setattr(os, "replace", lambda *names: (calls.append("rename"), rename(*names)))
+
+    def note(call, path):
+        calls.append(f"{call} {Path(path).suffix or Path(path).relative_to(tmp_path)}")
+
+    monkeypatch.setattr(os, "fsync", lambda fd: note("flush", os.readlink(f"/proc/self/fd/{fd}")))
+    monkeypatch.setattr(os, "replace", lambda old, new: (note("rename", new), rename(old, new)))
+    return calls
+
+
+def test_data_are_on_the_disk_before_the_name_and_the_name_before_the_end(tmp_path, recorded):
     with replacing(tmp_path / "a.csv") as temporary:
         temporary.write_text("new")
-    assert calls == ["file", "rename", "folder"]
+    assert recorded == ["flush .csv", "rename .csv", "flush ."]
+
+
+def test_pictures_are_on_the_disk_before_their_page_and_all_before_the_end(tmp_path, recorded):
+    names = ["flush .png", "rename .png", "flush new/deep", "flush .html", "rename .html", "flush new/deep"]
+    for folders in (["flush new", "flush ."], []):  # made by the first
+        with filling(tmp_path / "new" / "deep") as folder:
+            (folder / "a.html").write_text("page")
+            (folder / "b.png").write_text("picture")
+        assert recorded == [*folders, *names]
+        recorded.clear()
 
 
 def write_log(path):
@@ -217,25 +236,57 @@ def written(request, tmp_path):
     return request.param, path, path.read_bytes()
 
 
+class Layer:
+    """Lets call number `at` of open, fsync and replace fail, but none that removes a temporary folder."""
+
+    at = calls = 0
+
+    def __init__(self, monkeypatch):
+        for name in ("open", "fsync", "replace"):
+            monkeypatch.setattr(os, name, partial(self.fails_once, getattr(os, name)))
+
+    def fails_once(self, call, *words, **options):
+        self.calls += "dir_fd" not in options
+        if self.calls == self.at and "dir_fd" not in options:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return call(*words, **options)
+
+    def runs(self):
+        """Each run with another call that fails, the last with none."""
+        for self.at in range(1, 50):
+            self.calls = 0
+            yield
+            if self.calls < self.at:
+                return
+        raise AssertionError("more than 50 calls")
+
+
+def test_whichever_call_fails_a_page_shows_pictures_that_are_there(tmp_path, monkeypatch):
+    path, layer, failed = tmp_path / "report", Layer(monkeypatch), []
+    names = ("a.html", "b.png", "c.png")
+    for _ in layer.runs():
+        at, layer.at = layer.at, 0
+        with filling(path) as folder:
+            for name in names:
+                (folder / name).write_text("old")
+        layer.at, layer.calls = at, 0
+        try:
+            with filling(path) as folder:
+                for name in names:
+                    (folder / name).write_text("new")
+        except (OSError, UserError):
+            failed.append("".join((path / name).read_text()[0] for name in names))
+        assert [p.name for p in tmp_path.iterdir()] == ["report"]
+        assert sorted(p.name for p in path.iterdir()) == sorted(names)
+    assert failed == sorted(failed, reverse=True) and set(failed) == {"ooo", "ono", "onn", "nnn"}
+    assert all((path / name).read_text() == "new" for name in names)
+
+
 def test_whichever_call_fails_the_file_is_the_old_or_the_new_one(written, monkeypatch):
     write, path, whole = written
-    calls = at = 0
-
-    def layer(call):
-        def fails_once(*words, **options):
-            nonlocal calls
-            calls += 1
-            if calls == at:
-                raise OSError(errno.EIO, os.strerror(errno.EIO))
-            return call(*words, **options)
-
-        return fails_once
-
-    for name in ("open", "fsync", "replace"):
-        monkeypatch.setattr(os, name, layer(getattr(os, name)))
+    layer = Layer(monkeypatch)
     failures = []
-    for at in range(1, 50):  # read by the layer
-        calls = 0
+    for _ in layer.runs():
         path.write_text("old")
         try:
             write(path)
@@ -246,10 +297,8 @@ def test_whichever_call_fails_the_file_is_the_old_or_the_new_one(written, monkey
         else:
             assert path.read_bytes() == whole
         assert list(path.parent.iterdir()) == [path]
-        if calls < at:
-            break
     new = failures.count(whole)  # its folder could not be flushed
-    assert calls < at and 0 < new <= 2 and failures == [b"old"] * (len(failures) - new) + [whole] * new
+    assert 0 < new <= 2 and failures == [b"old"] * (len(failures) - new) + [whole] * new
 
 
 def test_a_disk_that_is_full_at_any_byte_leaves_the_old_file(written, capsys):  # capsys: no limit on stderr

@@ -236,23 +236,28 @@ def require_unread(path: str, inputs: Sequence[str | None]) -> None:
 def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield an empty folder; if the block succeeds, move its files to the folder `path`, pages (.html) last.
 
+    They are then on the disk even if the power fails; a page is not there before what it shows.
     UserError if there can be no such folder, as in `require_folder`.
     """
     require_folder(path)
     folder = Path(path)
+    new = [p for p in (folder, *folder.parents) if not p.exists()]
     beside = folder if folder.is_dir() else folder.parent
     beside.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=beside) as name:
         yield Path(name)
         folder.mkdir(exist_ok=True)
-        for file in sorted(Path(name).iterdir(), key=lambda p: (p.suffix == ".html", p.name)):
-            target = folder / file.name
-            if file.is_file():
-                if target.is_file():
-                    file.chmod(stat.S_IMODE(target.stat().st_mode))
-                _flush(file)
-            os.replace(file, target)
-        _flush(folder)
+        for made in new:
+            _flush(made.parent)
+        for pages in (False, True):
+            for file in sorted(p for p in Path(name).iterdir() if (p.suffix == ".html") == pages):
+                target = folder / file.name
+                if file.is_file():
+                    if target.is_file():
+                        file.chmod(stat.S_IMODE(target.stat().st_mode))
+                    _flush(file)
+                os.replace(file, target)
+            _flush(folder)
 
 
 def require_folder(path: str | os.PathLike[str]) -> None:
