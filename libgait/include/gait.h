@@ -112,17 +112,17 @@ typedef struct gait_image { GAIT_IMAGE_FIELDS(GAIT_DECLARE) } gait_image;
           int32_t, width, , "pixels")                                                                                 \
     FIELD("Height of its images, 1 to 16000.",                                                                        \
           int32_t, height, , "pixels")                                                                                \
-    FIELD("Focal length along u.",                                                                                    \
+    FIELD("Focal length along u, 1e-3 to 1e9.",                                                                       \
           float, fx, , "pixels")                                                                                      \
-    FIELD("Focal length along v.",                                                                                    \
+    FIELD("Focal length along v, 1e-3 to 1e9.",                                                                       \
           float, fy, , "pixels")                                                                                      \
-    FIELD("Principal point, u.",                                                                                      \
+    FIELD("Principal point, u, within 1e6 of 0.",                                                                     \
           float, cx, , "pixels")                                                                                      \
-    FIELD("Principal point, v.",                                                                                      \
+    FIELD("Principal point, v, within 1e6 of 0.",                                                                     \
           float, cy, , "pixels")                                                                                      \
     FIELD("Rotation from world to camera, row-major.",                                                                \
           float, R, [9], "")                                                                                          \
-    FIELD("World origin in camera coordinates.",                                                                      \
+    FIELD("World origin in camera coordinates, each within 1e4.",                                                     \
           float, t, [3], "metres")                                                                                    \
     FIELD("Lens distortion k1 k2 p1 p2 k3 as in OpenCV; it is applied to images as captured.",                        \
           float, distortion, [5], "")

@@ -142,6 +142,15 @@ static void test_cameras(void)
         cfg.camera[k].fy = NAN;
         refuse(&cfg, GAIT_ERR_ARG, k, k ? "camera 1" : "camera 0");
         cfg = toy_config(2);
+        cfg.camera[k].cx = 3e38f;
+        refuse(&cfg, GAIT_ERR_ARG, k, "cx, cy in [-1e6, 1e6]");
+        cfg = toy_config(2);
+        cfg.camera[k].fx = 1e-30f;
+        refuse(&cfg, GAIT_ERR_ARG, k, "fx, fy in [1e-3, 1e9]");
+        cfg = toy_config(2);
+        cfg.camera[k].t[2] = 3e38f;
+        refuse(&cfg, GAIT_ERR_ARG, k, "t in [-1e4, 1e4] metres");
+        cfg = toy_config(2);
         cfg.camera[k].height = 1 << 20;
         refuse(&cfg, GAIT_ERR_LIMIT, k, k ? "camera 1" : "camera 0");
     }

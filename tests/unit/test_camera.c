@@ -50,11 +50,17 @@ static void test_valid(void)
         CHECK(!camera_valid(&c));
         *number[i] = kept;
     }
-    c.fx = 0.0f;
-    CHECK(!camera_valid(&c));
-    c = toward_origin();
-    c.fy = -1.0f;
-    CHECK(!camera_valid(&c));
+    static const float ends[][2] = {{1e-3f, 1e9f}, {1e-3f, 1e9f}, {-1e6f, 1e6f}, {-1e6f, 1e6f},
+                                    {0.0f, 0.0f},  {-1e4f, 1e4f}, {-1e3f, 1e3f}};
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
+        for (int high = 0; high < 2; high++) {
+            float const kept = *number[i], at = ends[i][high];
+            *number[i] = at;
+            CHECK(camera_valid(&c));
+            *number[i] = high ? at + 0.01f * fabsf(at) + 0.01f : at - 0.01f * fabsf(at) - 0.01f;
+            CHECK(!camera_valid(&c));
+            *number[i] = kept;
+        }
     c = toward_origin();
     c.width = -1;
     CHECK(!camera_valid(&c));

@@ -508,7 +508,7 @@ static void test_arguments(void)
     for (int i = 0; i < 4; i++)
         CHECK(gait_lift_init(i == 0 ? NULL : toy_lift_memory, bytes, i == 1 ? NULL : toy_lift_model,
                              i == 2 ? NULL : &good, i == 3 ? NULL : &l, NULL) == GAIT_ERR_ARG);
-    enum { BAD = 22 };
+    enum { BAD = 24 };
     gait_lift_config bad[BAD];
     for (int i = 0; i < BAD; i++)
         bad[i] = good;
@@ -537,6 +537,8 @@ static void test_arguments(void)
         bad[20 + i].projection = GAIT_LIFT_ORTHOGRAPHIC;
         bad[20 + i].axis[i][0] = 2.0;
     }
+    bad[22].camera.cx = 3e38f;
+    bad[23].camera.fx = 1e-30f;
     for (int i = 0; i < BAD; i++) {
         err.text[0] = '\0';
         bool const whole = i == 6 || i == 7; /* max_iterations, lag */

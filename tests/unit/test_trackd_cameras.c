@@ -82,6 +82,7 @@ static void test_check(void)
         {48, 33, 50, 50, 24, 16, "more than the 1536 that --max-pixels leaves"},
         {48, 32, 0, 50, 24, 16, "focal lengths 0 and 50"},
         {48, 32, 50, NAN, 24, 16, "focal lengths 50 and nan"},
+        {48, 32, 1e-30f, 50, 24, 16, "focal lengths 1e-30 and 50"},
         {48, 32, 50, 50, 3e38f, 16, "principal point (3e+38, 16) is not near the middle of 48x32 pixels"},
         {48, 32, 50, 50, NAN, 16, "principal point"},
         {48, 32, 50, 50, 24, -INFINITY, "principal point"},
@@ -103,6 +104,12 @@ static void test_check(void)
         c.cx = bad[i].cx, c.cy = bad[i].cy;
         CHECK(!camera_check(&c, 48 * 32, &why) && strstr(why.text, bad[i].reason));
     }
+    c = CAMERA;
+    c.t[1] = 3e38f;
+    CHECK(!camera_check(&c, 48 * 32, &why) && strstr(why.text, "send metres, within 10 km"));
+    c = CAMERA;
+    c.distortion[4] = NAN;
+    CHECK(!camera_check(&c, 48 * 32, &why) && strstr(why.text, "distortion outside"));
     for (int i = 0; i < 9; i++) { /* another number anywhere, or a left-handed system */
         c = CAMERA;
         c.R[i] = c.R[i] == 0.0f ? 0.1f : -c.R[i];

@@ -249,6 +249,30 @@ static void test_resampling(void)
     CHECK(flagged[0] == 0 && flagged[1] > 3 && flagged[1] < 19 && flagged[2] == 19);
 }
 
+/* Cameras at the ends of their ranges, in which nothing is seen as it is, give finite estimates. */
+static void test_extreme_cameras(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    float *const number[] = {&cfg.camera[0].fx,   &cfg.camera[0].fy,           &cfg.camera[0].cx,
+                             &cfg.camera[0].cy,   &cfg.camera[0].t[0],         &cfg.camera[0].t[2],
+                             &cfg.camera[0].t[2], &cfg.camera[0].distortion[4]};
+    static const float end[] = {1e-3f, 1e9f, 1e6f, -1e6f, -1e4f, 1e4f, -1e4f, 1e3f};
+    for (size_t k = 0; k < sizeof end / sizeof *end; k++) {
+        float const kept = *number[k];
+        gait_estimate e;
+        *number[k] = end[k];
+        gait_tracker *const t = film_tracker(&cfg, 10, 1.0f);
+        for (int n = 10; n < 13; n++) {
+            film_step(t, 1, n, 0, &e);
+            CHECK(f_finite(e.pose.joint[0], sizeof e.pose.joint / sizeof(float)));
+            CHECK(f_finite(e.joint_sd[0], sizeof e.joint_sd / sizeof(float)) && f_finite(e.mean.pelvis, 3));
+            CHECK(isfinite(e.ess) && isfinite(e.log_evidence));
+        }
+        toy_tracker_free(t);
+        *number[k] = kept;
+    }
+}
+
 int main(void)
 {
     film_make(SCENE_CAMERAS, 60);
@@ -260,5 +284,6 @@ int main(void)
     test_ambiguous();
     test_appearance();
     test_resampling();
+    test_extreme_cameras();
     return CHECK_DONE();
 }

@@ -94,7 +94,7 @@ static bool parse_camera(const fields *f, gait_camera *c, message *why)
         !read_numbers(f, "cx", &c->cx, 1, -1e6, 1e6, middle, why) ||
         !read_numbers(f, "cy", &c->cy, 1, -1e6, 1e6, middle, why) ||
         !read_numbers(f, "R", c->R, 9, -2, 2, "give the rotation from world to camera, 3 rows of 3", why) ||
-        !read_numbers(f, "t", c->t, 3, -1e6, 1e6,
+        !read_numbers(f, "t", c->t, 3, -1e4, 1e4,
                       "give the translation from world to camera, 3 numbers in metres", why) ||
         !read_distortion(f, c->distortion, why))
         return false;
@@ -138,6 +138,14 @@ int64_t camera_pixels(const gait_camera *camera)
     return (int64_t)camera->width * camera->height;
 }
 
+static bool within(const float *x, int count, float low, float high)
+{
+    bool ok = true;
+    for (int i = 0; i < count; i++)
+        ok = ok && x[i] >= low && x[i] <= high;
+    return ok;
+}
+
 bool camera_check(const gait_camera *c, int64_t max_pixels, message *why)
 {
     if (c->width < 1 || c->height < 1 || c->width > GAIT_MAX_PIXELS || c->height > GAIT_MAX_PIXELS)
@@ -147,9 +155,15 @@ bool camera_check(const gait_camera *c, int64_t max_pixels, message *why)
         return message_set(why,
                            "camera with %dx%d pixels, more than the %" PRId64 " that --max-pixels leaves",
                            c->width, c->height, max_pixels);
-    if (!(c->fx > 0) || !(c->fy > 0))
+    const float focal[2] = {c->fx, c->fy};
+    if (!within(focal, 2, 1e-3f, 1e9f))
         return message_set(why, "camera with focal lengths %g and %g; send pixels", (double)c->fx,
                            (double)c->fy);
+    if (!within(c->t, 3, -1e4f, 1e4f))
+        return message_set(why, "camera with t = %g, %g, %g; send metres, within 10 km", (double)c->t[0],
+                           (double)c->t[1], (double)c->t[2]);
+    if (!within(c->distortion, 5, -1e3f, 1e3f))
+        return message_set(why, "camera with a distortion outside [-1000, 1000]; send k1 k2 p1 p2 k3");
     return check_middle(c, "camera", why) && check_rotation(c, "camera", why);
 }
 

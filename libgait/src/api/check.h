@@ -4,7 +4,9 @@
 #include "base/base.h"
 
 /* What is required of a camera: the text of every error about one that is not. */
-#define CHECK_CAMERA "size and focal lengths must be positive, R a rotation, all numbers finite"
+#define CHECK_CAMERA                                                                                         \
+    "size must be positive, fx, fy in [1e-3, 1e9], cx, cy in [-1e6, 1e6], R a rotation, t in [-1e4, 1e4] "   \
+    "metres, distortion in [-1e3, 1e3]"
 
 /* Whether a camera can be used; `index` is its number in errors, -1: the only one. */
 gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err);

@@ -41,13 +41,6 @@ static bool orthonormal(const double axis[2][3])
            within(product[2], -1e-9, 1e-9);
 }
 
-/* Whether t is within 10 km along each axis: beyond, single precision cannot resolve the ray of a pixel. */
-static bool near(const float t[3])
-{
-    return within((double)t[0], -1e4, 1e4) && within((double)t[1], -1e4, 1e4) &&
-           within((double)t[2], -1e4, 1e4);
-}
-
 static gait_result check_config(const gait_lift_config *c, gait_error *err)
 {
     gait_result const s = fields_check("gait_lift_config", c, "lift config: ", err);
@@ -62,7 +55,6 @@ static gait_result check_config(const gait_lift_config *c, gait_error *err)
         : !cpu_mask_valid(c->cpu_mask)                 ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
         : !perspective && !orthonormal(c->axis)        ? "axis is not two unit vectors at right angles"
         : perspective && !camera_valid(&c->camera)     ? "camera: " CHECK_CAMERA
-        : perspective && !near(c->camera.t)            ? "camera is not within 10 km: t is in metres"
                                                        : NULL;
     return bad ? base_fail(err, GAIT_ERR_ARG, -1, "lift config: %s", bad) : GAIT_OK;
 }

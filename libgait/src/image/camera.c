@@ -21,11 +21,20 @@ static bool rotation_valid(const float R[9])
     return determinant(R) > 0.0f;
 }
 
+/* False for NaN. */
+static bool within(const float *x, int count, float low, float high)
+{
+    bool ok = true;
+    for (int i = 0; i < count; i++)
+        ok &= x[i] >= low && x[i] <= high;
+    return ok;
+}
+
 bool camera_valid(const gait_camera *c)
 {
-    const float intrinsics[4] = {c->fx, c->fy, c->cx, c->cy};
-    return c->width > 0 && c->height > 0 && f_finite(intrinsics, 4) && c->fx > 0.0f && c->fy > 0.0f &&
-           f_finite(c->R, 9) && f_finite(c->t, 3) && f_finite(c->distortion, 5) && rotation_valid(c->R);
+    const float focal[2] = {c->fx, c->fy}, middle[2] = {c->cx, c->cy};
+    return c->width > 0 && c->height > 0 && within(focal, 2, 1e-3f, 1e9f) && within(middle, 2, -1e6f, 1e6f) &&
+           within(c->t, 3, -1e4f, 1e4f) && within(c->distortion, 5, -1e3f, 1e3f) && rotation_valid(c->R);
 }
 
 bool camera_distorted(const gait_camera *c)

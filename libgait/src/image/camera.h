@@ -6,7 +6,7 @@
 
 #define CAMERA_NEAR 0.05f /* metres: points nearer than this are not projected */
 
-/* True if size and focal lengths are positive, all numbers finite, and R orthonormal to 1e-3 with det R > 0. */
+/* True if the size is positive, every number in the range that gait.h gives, and R orthonormal to 1e-3 with det R > 0. */
 bool camera_valid(const gait_camera *c);
 
 /* GAIT_ERR_ARG unless the pose of a valid camera is plausible, as described at gait_camera_check(). */
