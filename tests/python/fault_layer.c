@@ -1,6 +1,7 @@
 /* fault_layer.c - loaded under a program by LD_PRELOAD: lets call number GAIT_FAULT_AT of GAIT_FAULT (malloc, fwrite or
  * fsync) fail once, and then makes the file GAIT_FAULT_DONE; or, by GAIT_FAULT=clock, lets the wall clock jump to and fro by
- * a day.  Memory: only calls of the program itself count, not those of its libraries. */
+ * a day; or, by GAIT_FAULT=order, writes there a letter for each call on a file: w: fwrite, s: fsync of all that was
+ * written, ! of less, D: fsync of a folder.  Memory: only calls of the program itself count, not those of its libraries. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -9,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -44,6 +46,24 @@ static int fails(const char *what, int number)
     return 1;
 }
 
+static size_t written; /* bytes */
+
+static void record(char call)
+{
+    if (!fault || strcmp(fault, "order") != 0)
+        return;
+    int const done = open(getenv("GAIT_FAULT_DONE"), O_WRONLY | O_CREAT | O_APPEND, 0600);
+    if (write(done, &call, 1) != 1)
+        abort();
+    close(done);
+}
+
+static char kind_of_fsync(int file)
+{
+    struct stat is;
+    return fstat(file, &is) != 0 ? '?' : S_ISDIR(is.st_mode) ? 'D' : (size_t)is.st_size < written ? '!' : 's';
+}
+
 static int is_own(const void *caller)
 {
     return (uintptr_t)caller >= first && (uintptr_t)caller < last;
@@ -72,7 +92,11 @@ size_t fwrite(const void *data, size_t size, size_t count, FILE *f)
     static size_t (*next)(const void *, size_t, size_t, FILE *);
     if (!next)
         NEXT("fwrite");
-    return f != stdout && f != stderr && fails("fwrite", EIO) ? 0 : next(data, size, count, f);
+    if (f == stdout || f == stderr)
+        return next(data, size, count, f);
+    written += size * count;
+    record('w');
+    return fails("fwrite", EIO) ? 0 : next(data, size, count, f);
 }
 
 int fsync(int file)
@@ -80,6 +104,7 @@ int fsync(int file)
     static int (*next)(int);
     if (!next)
         NEXT("fsync");
+    record(kind_of_fsync(file));
     return fails("fsync", EIO) ? -1 : next(file);
 }
 

@@ -64,8 +64,16 @@ def test_every_call_that_fails_is_one_line_and_exit_1(layer, words, tmp_path, fa
             break
         lines = [line for line in ended.stderr.splitlines() if " particles, " not in line]
         assert ended.returncode == 1 and len(lines) == 1 and reason in lines[0], (at, ended)
-    assert came is False and at > {"malloc": 8, "fwrite": 20, "fsync": 1}[fault]
+    assert came is False and at > {"malloc": 8, "fwrite": 20, "fsync": 2}[fault]
     assert ended.returncode == 0, ended
+
+
+@pytest.mark.parametrize("mode", ["w", "a"])
+def test_a_log_and_then_its_name_are_on_the_disk_before_the_end(layer, words, tmp_path, mode):
+    words = [f"file://{tmp_path}/out.log?mode={mode}" if "out.log" in str(word) else word for word in words]
+    ended, _ = run(words, layer, tmp_path / "done", "order")
+    assert ended.returncode == 0, ended
+    assert re.fullmatch("w{20,}sD", (tmp_path / "done").read_text())
 
 
 @pytest.mark.parametrize(

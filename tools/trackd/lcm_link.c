@@ -1,5 +1,7 @@
 #include "lcm_link.h"
 
+#include "folder.h"
+
 #include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -216,8 +218,8 @@ bool sink_open(sink *s, const char *url, message *why)
     if (!lock(s, path, why))
         return false;
     s->log = lcm_eventlog_create(path, mode);
-    if (mode[0] == 'w')
-        snprintf(s->path, sizeof s->path, "%s", path);
+    snprintf(s->path, sizeof s->path, "%s", path);
+    s->emptied = mode[0] == 'w';
     if (s->log)
         return true;
     message_set(why, "%.160s: this log cannot be written: %s", path, strerror(errno));
@@ -265,17 +267,21 @@ bool sink_ended(const sink *s, message *why)
            !message_set(why, "--out: the log cannot be written: %.180s", s->fault.text);
 }
 
-/* Write all that is buffered to the disk; devices and pipes have none. */
-static bool flush(FILE *f)
+/* Write all that is buffered to the disk, and the log's name; devices and pipes, and their folders, may have none. */
+static bool flush(const sink *s)
 {
-    return fflush(f) == 0 && (fsync(fileno(f)) == 0 || errno == EINVAL || errno == EROFS);
+    FILE *const f = s->log->f;
+    if (fflush(f) != 0 || (fsync(fileno(f)) != 0 && errno != EINVAL && errno != EROFS))
+        return false;
+    errno = folder_flush(s->path);
+    return errno == 0 || errno == EROFS;
 }
 
 /* Remove a new log for which there was no space at all. */
 static void remove_empty(const sink *s)
 {
     struct stat is;
-    if (s->failed && s->path[0] && fstat(s->lock, &is) == 0 && S_ISREG(is.st_mode) && is.st_size == 0)
+    if (s->failed && s->emptied && fstat(s->lock, &is) == 0 && S_ISREG(is.st_mode) && is.st_size == 0)
         unlink(s->path);
 }
 
@@ -283,7 +289,7 @@ bool sink_close(sink *s, message *why)
 {
     if (s->lcm)
         lcm_destroy(s->lcm);
-    if (s->log && !flush(s->log->f) && !s->failed)
+    if (s->log && !flush(s) && !s->failed)
         lost(s, strerror(errno));
     bool const ok = s->failed == 0 ||
                     message_set(why, "--out: %s %.180s",

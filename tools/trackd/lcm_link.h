@@ -36,7 +36,8 @@ typedef struct sink {     /* all zero: no output */
     lcm_t *lcm;           /* or NULL */
     lcm_eventlog_t *log;  /* or NULL */
     int lock;             /* with a log: descriptor that locks it, or -1 */
-    char path[LINK_PATH]; /* of a new log */
+    char path[LINK_PATH]; /* of the log */
+    bool emptied;         /* it is a new one, or was emptied */
     int64_t failed;       /* messages that did not go out */
     message fault;        /* of the first of them */
 } sink;

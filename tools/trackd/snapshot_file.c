@@ -1,6 +1,6 @@
 #include "snapshot_file.h"
 
-#include "options.h"
+#include "folder.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -133,15 +133,6 @@ static bool write_all(int file, const unsigned char *data, size_t bytes)
     return true;
 }
 
-/* Open the folder of a file; -1: it cannot be opened. */
-static int open_folder(const char *path)
-{
-    char folder[OPTION_TEXT];
-    const char *const slash = strrchr(path, '/');
-    snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path + 1) : 1, slash ? path : ".");
-    return open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-}
-
 /* What a file PATH is written to first: PATH.PROCESS.RANDOM. */
 enum { RANDOM_DIGITS = 8 };
 
@@ -179,12 +170,7 @@ static int replace(const char *path, const unsigned char *data, size_t bytes, st
     }
     if (lstat(path, written) != 0)
         written->st_ino = 0;
-    int const folder = open_folder(path);
-    if (folder < 0 || (fsync(folder) != 0 && errno != EINVAL))
-        fault = errno;
-    if (folder >= 0)
-        close(folder);
-    return fault;
+    return folder_flush(path);
 }
 
 /* Whether a daemon that wrote a file has ended.  One with our own number has: in a container all have the same. */
@@ -198,7 +184,7 @@ static void sweep(const char *path)
 {
     const char *const slash = strrchr(path, '/'), *const name = slash ? slash + 1 : path;
     size_t const n = strlen(name);
-    int const folder = open_folder(path);
+    int const folder = folder_open(path);
     DIR *const list = folder < 0 ? NULL : fdopendir(folder);
     for (struct dirent *e; list && (e = readdir(list));) {
         char *end = e->d_name;
