@@ -452,7 +452,8 @@ $(B)/bench/step-static: $(BENCH_OBJ) $(BENCH_PARTS) $(OBJ)
 QEMU ?= qemu-$(CPU)
 bench-instructions: $(B)/bench/instructions build/bench/instructions_plugin.so | $(READY) ## instructions of a particle under QEMU (CC=aarch64-linux-gnu-gcc; --record)
 	@command -v $(QEMU) >/dev/null || { echo 'bench-instructions: no $(QEMU): install qemu-user' >&2; exit 1; }
-	@$(PY) tests/bench/instructions.py $(MACHINE) '$(QEMU)' build/bench/instructions_plugin.so $< $(ARGS)
+	@$(PY) tests/bench/instructions.py $(MACHINE) '$(QEMU)' build/bench/instructions_plugin.so $< --cc '$(CC)' \
+	    --flags='$(strip $(OPT) $(CFLAGS))' $(ARGS)
 
 $(B)/bench/instructions: $(B)/bench/instructions.o $(B)/bench/bench_scene.o $(B)/tools/trackd/common.c.o $(OBJ)
 	$(call log,LD   $@)$(CC) $(OPT) $(LDFLAGS) -static -o $@ $^ -lm -pthread
