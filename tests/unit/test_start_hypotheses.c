@@ -8,7 +8,7 @@
 
 #include "check.h"
 
-enum { FRAMES = 40 };
+enum { FRAMES = 40, FILM = 55 };
 
 static gait_tracker_config config(void)
 {
@@ -70,7 +70,7 @@ static void test_particles_follow_the_probabilities(void)
     h[1].in_place = 1;           /* cannot be tracked along with the first */
     h[2].mean.pelvis[0] += 1.0f; /* outside the region in which the first is searched for */
     t = begin(&cfg, h, 4);
-    CHECK(t->cfg.particles == cfg.particles && particles_of(t, &h[0]) == cfg.particles);
+    CHECK(particles_of(t, &h[0]) == t->cfg.particles);
     toy_tracker_free(t);
 }
 
@@ -98,22 +98,26 @@ static void test_particles_are_correlated(void)
     toy_tracker_free(t);
 }
 
-/* The same bits as a start by hand. */
-static void test_one_is_a_start(void)
+/* A start with a known phase leaves left and right open, as its keypoints may be swapped: the images decide. */
+static void test_sides_are_open(void)
 {
-    gait_tracker_config const cfg = config();
-    gait_hypothesis const h = truth(1.0f);
-    gait_tracker *const a = begin(&cfg, &h, 1), *const b = film_tracker(&cfg, 0, 1.0f);
-    gait_estimate x, y;
-    for (int n = 0; n < FRAMES; n++) {
-        film_step(a, 1, n, 0, &x);
-        film_step(b, 1, n, 0, &y);
-        CHECK(!memcmp(&x.mean, &y.mean, sizeof x.mean) &&
-              (x.status == y.status || x.status == GAIT_TRACK_INIT));
+    for (int swapped = 0; swapped < 2; swapped++) {
+        gait_tracker_config const cfg = config();
+        gait_hypothesis const h = swapped ? half_stride(1.0f) : truth(1.0f);
+        gait_tracker *const t = begin(&cfg, &h, 1);
+        gait_estimate e;
+        int tracked = 0, two = 0;
+        for (int n = 0; n < FILM; n++) {
+            gait_state const now = toy_walk((float)n / 30.0f);
+            film_step(t, 1, n, 0, &e);
+            bool const right = fabsf(m_wrap_pi(TWO_PI_F * (e.mean.phase - now.phase))) < 0.6f;
+            CHECK(e.status != GAIT_TRACK_TRACKING || right);
+            tracked += e.status == GAIT_TRACK_TRACKING;
+            two += t->core->hypotheses.stage == HYPOTHESES_TWO;
+        }
+        CHECK(two > 10 && tracked > 30);
+        toy_tracker_free(t);
     }
-    CHECK(gait_tracker_digest(a) == gait_tracker_digest(b));
-    toy_tracker_free(a);
-    toy_tracker_free(b);
 }
 
 /* The correct hypothesis is the least probable one. */
@@ -132,7 +136,7 @@ static void test_images_choose(void)
         tracked += e.status == GAIT_TRACK_TRACKING;
         CHECK(e.status == GAIT_TRACK_INIT || right);
     }
-    CHECK(tracked > FRAMES - 18 && t->core->hypotheses.stage == HYPOTHESES_ONE);
+    CHECK(tracked > FRAMES - 24 && t->core->hypotheses.stage == HYPOTHESES_ONE);
     CHECK(t->cfg.particles == cfg.particles);
     toy_tracker_free(t);
 }
@@ -169,7 +173,7 @@ static void test_open_phase(void)
     gait_tracker *const t = begin(&cfg, h, 2);
     gait_estimate e;
     CHECK(t->core->hypotheses.stage == HYPOTHESES_ACQUISITION && !t->core->hypotheses.left_right_known);
-    for (int n = 0; n < 55; n++) {
+    for (int n = 0; n < FILM; n++) {
         film_step(t, 1, n, 0, &e);
         CHECK(n > 10 || e.status == GAIT_TRACK_INIT);
     }
@@ -225,13 +229,13 @@ static uint64_t digest(uint32_t cpu_mask)
     return hash;
 }
 
-#define GOLDEN UINT64_C(0x76861357d5227c75)
+#define GOLDEN UINT64_C(0xa07fb9742fdfc6d3)
 
 static void tests(void)
 {
     test_particles_follow_the_probabilities();
     test_particles_are_correlated();
-    test_one_is_a_start();
+    test_sides_are_open();
     test_images_choose();
     test_no_person();
     test_open_phase();
@@ -240,6 +244,6 @@ static void tests(void)
 
 int main(int argc, char **argv)
 {
-    film_make(1, 55);
+    film_make(1, FILM);
     return golden_main(argc, argv, tests, digest, GOLDEN, "start_hypotheses");
 }

@@ -1,6 +1,8 @@
 #include "likelihood/likelihood.h"
 #include "base/fmath.h"
 
+#include <string.h>
+
 static const like_term *const TERMS[LIKE_TERMS] = {
     [LIKE_TEXTURE] = &like_texture,   [LIKE_SILHOUETTE] = &like_silhouette, [LIKE_EDGES] = &like_edges,
     [LIKE_TEMPLATE] = &like_template, [LIKE_KEYPOINTS] = &like_keypoints,
@@ -77,6 +79,20 @@ static void costs_init(like_setup *s)
     }
 }
 
+/* Parts and pairs of joints, by names such as l_knee and r_knee. */
+static COLD void sides_init(like_setup *s, const gait_model *m)
+{
+    for (int32_t p = 0; p < m->points; p++) {
+        const char *const name = m->point_name[p];
+        int32_t q = 0;
+        while (q < m->points && (q == p || strcmp(m->point_name[q] + 1, name + 1) != 0))
+            q++;
+        bool const arm = name[2] == 's' || name[2] == 'e' || name[2] == 'w'; /* shoulder, elbow, wrist */
+        s->opposite[p] = (uint8_t)(q < m->points ? q : p);
+        s->part[p] = q == m->points ? LIKE_MIDDLE : arm ? LIKE_ARMS : LIKE_LEGS;
+    }
+}
+
 void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg, const kernels *run)
 {
     s->run = run;
@@ -96,6 +112,7 @@ void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_conf
     s->weight[LIKE_EDGES] = cfg->edges_weight;
     s->weight[LIKE_TEMPLATE] = cfg->template_weight;
     s->weight[LIKE_KEYPOINTS] = cfg->keypoints_weight;
+    sides_init(s, m);
     limb_geometry_init(m, cfg->girth, s->geometry);
     for (int32_t l = 0; l < m->limbs; l++)
         surface_init(&s->geometry[l], points, &s->surface[l]);

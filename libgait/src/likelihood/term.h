@@ -25,6 +25,9 @@ enum {
     LIKE_COUNT_ONE = 1 << 24 /* added to every entry, so that a sum of costs also contains their number */
 };
 
+/* Parts of the body.  A detector confuses left and right of the legs and of the arms independently. */
+enum { LIKE_MIDDLE, LIKE_LEGS, LIKE_ARMS, LIKE_PARTS };
+
 /* Whether a point of an outline is visible is read at this share of the way to the limb's middle. */
 #define LIKE_INWARD 0.3f
 
@@ -105,6 +108,8 @@ typedef struct like_setup { /* constant while a tracker lives */
     uint32_t terms;          /* GAIT_TERM_* */
     float weight[LIKE_TERMS];
     float missed_weight;
+    uint8_t part[GAIT_MAX_JOINTS];     /* of each joint: LIKE_MIDDLE, LIKE_LEGS or LIKE_ARMS */
+    uint8_t opposite[GAIT_MAX_JOINTS]; /* the joint of the other side, or itself */
     limb_geometry geometry[MODEL_MAX_LIMBS];
     like_costs robust;                     /* Student-t cost, LIKE_COST_ONE = 1 nat */
     like_costs square;                     /* the difference squared */

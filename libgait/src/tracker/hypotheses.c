@@ -9,8 +9,7 @@
 static const float ACQUISITION_TIME = 0.5f; /* seconds until the phase is known modulo half a stride */
 /* Seconds in which both hypotheses adapt to the images before evidence counts. */
 static const float REFIT_TIME = 0.4f;
-static const float AGREED =
-    0.9f; /* weight of the dominant hypothesis from which those of a start are decided */
+static const float AGREED = 0.9f; /* weight of the dominant hypothesis from which those of a start agree */
 static const float JITTER_SCORE = 0.5f, JITTER_HEADING = 0.1f, JITTER_RATE = 0.02f,
                    JITTER_PHASE = 0.05f; /* sd */
 /* Log odds from which left and right are reported as known (probability 0.99), and the other hypothesis is dropped. */
@@ -35,9 +34,7 @@ static void enter(gait_tracker *t, int32_t stage)
                                              .log_odds = t->core->found ? 0.0 : t->core->hypotheses.log_odds};
 }
 
-/* Share of a frame's log-likelihood that counts, `seconds` after the last frame: errors of the image terms are
- * correlated over config evidence_time. */
-static float evidence_share(const gait_tracker *t, float seconds)
+float hypotheses_evidence_share(const gait_tracker *t, float seconds)
 {
     float const time = t->cfg.evidence_time;
     return seconds > 0.0f && seconds < time ? seconds / time : 1.0f;
@@ -51,7 +48,7 @@ void hypotheses_acquire(gait_tracker *t)
 void hypotheses_compare(gait_tracker *t)
 {
     hypotheses_acquire(t);
-    t->core->hypotheses.left_right_known = 1;
+    t->core->hypotheses.phase_known = 1;
 }
 
 void hypotheses_settle(gait_tracker *t)
@@ -78,17 +75,16 @@ void hypotheses_require_proof(gait_tracker *t)
 bool hypotheses_prove(gait_tracker *t, float dt, float nats)
 {
     hypotheses_state *const h = &t->core->hypotheses;
-    double const sum = nats == 0.0f ? 0.0 : h->log_odds + (double)(evidence_share(t, dt) * nats);
+    double const sum = nats == 0.0f ? 0.0 : h->log_odds + (double)(hypotheses_evidence_share(t, dt) * nats);
     if (h->log_odds < 0.0)
         h->log_odds = sum > 0.0 ? 0.0 : sum < -PROOF ? -PROOF : sum;
     return h->log_odds >= 0.0;
 }
 
-bool hypotheses_agree(const gait_tracker *t, float weight)
+void hypotheses_agree(gait_tracker *t, float weight)
 {
-    const hypotheses_state *const h = &t->core->hypotheses;
-    return h->stage == HYPOTHESES_ACQUISITION && h->left_right_known &&
-           (weight >= AGREED || seconds_in_stage(t) >= ACQUISITION_TIME);
+    hypotheses_state *const h = &t->core->hypotheses;
+    h->agreed |= h->stage == HYPOTHESES_ACQUISITION && h->phase_known && weight >= AGREED;
 }
 
 /* The person is to be found first. */
@@ -97,8 +93,8 @@ bool hypotheses_acquired(const gait_tracker *t)
     const hypotheses_state *const h = &t->core->hypotheses;
     if (h->stage == HYPOTHESES_ONE)
         return t->classes && t->classes->open_sides;
-    return h->stage == HYPOTHESES_ACQUISITION && !h->left_right_known && h->log_odds >= 0.0 &&
-           seconds_in_stage(t) >= ACQUISITION_TIME;
+    return h->stage == HYPOTHESES_ACQUISITION && h->log_odds >= 0.0 &&
+           (h->agreed || seconds_in_stage(t) >= ACQUISITION_TIME);
 }
 
 bool hypotheses_open(const gait_tracker *t)
@@ -385,7 +381,7 @@ static double log_add(double a, double b)
 static void update_odds(gait_tracker *t, float dt, double without_silhouette, double all)
 {
     hypotheses_state *const h = &t->core->hypotheses;
-    double const share = (double)evidence_share(t, dt);
+    double const share = (double)hypotheses_evidence_share(t, dt);
     bool const supported_lately = seconds_unsupported(t) < 1.5f * dt;
     h->recent_log_ratio += share * (all - h->recent_log_ratio);
     if (supported_lately && seconds_in_stage(t) >= REFIT_TIME)
@@ -430,11 +426,10 @@ static pf_summary update_hypotheses(gait_tracker *t, float dt)
 
 pf_summary hypotheses_update(gait_tracker *t, float dt)
 {
-    evidence_temper(t->loglik, t->cfg.particles, evidence_share(t, seconds_unsupported(t)));
+    evidence_temper(t->loglik, t->cfg.particles, hypotheses_evidence_share(t, seconds_unsupported(t)));
     if (t->core->hypotheses.stage == HYPOTHESES_TWO)
         return update_hypotheses(t, dt);
     if (t->core->hypotheses.stage == HYPOTHESES_ACQUISITION)
-        evidence_anneal(&t->filter, t->loglik,
-                        t->core->hypotheses.left_right_known ? KNOWN_ESS : UNKNOWN_ESS);
+        evidence_anneal(&t->filter, t->loglik, t->core->hypotheses.phase_known ? KNOWN_ESS : UNKNOWN_ESS);
     return pf_update(&t->filter, t->loglik);
 }

@@ -9,9 +9,10 @@
  * which leg is in front, and such errors do not average out.  Frames closer together than config evidence_time count
  * less, here as in the particles' weights, because their errors are correlated.
  *
- * Stages: after a start with an open phase HYPOTHESES_ACQUISITION finds the phase modulo half a stride, HYPOTHESES_TWO
- * decides between left and right, HYPOTHESES_ONE tracks.  After a start from several hypotheses with known phases,
- * HYPOTHESES_ACQUISITION finds the correct one and HYPOTHESES_ONE follows. */
+ * Stages: HYPOTHESES_ACQUISITION finds the phase modulo half a stride, HYPOTHESES_TWO decides between left and right,
+ * HYPOTHESES_ONE tracks.  After an automatic start with known phases acquisition only chooses among its hypotheses.  Left
+ * and right are open even then: a detector may confuse them throughout the second from which the start was found, and the
+ * same keypoints would otherwise count twice.  A start by hand with a known phase begins with HYPOTHESES_ONE. */
 #ifndef GAIT_TRACKER_HYPOTHESES_H
 #define GAIT_TRACKER_HYPOTHESES_H
 #include "tracker/tracker_state.h"
@@ -19,7 +20,7 @@
 /* The phase is open: begin acquisition (in paper mode there is only one hypothesis). */
 void hypotheses_acquire(gait_tracker *t);
 
-/* Several hypotheses of a start, in which left and right are known: begin acquisition of the correct one. */
+/* Hypotheses of an automatic start with known phases: begin acquisition of the correct one, except for its side. */
 void hypotheses_compare(gait_tracker *t);
 
 /* Left and right are known: one hypothesis. */
@@ -38,8 +39,9 @@ void hypotheses_drop(gait_tracker *t);
 bool hypotheses_decided(const gait_tracker *t);
 void hypotheses_merge(gait_tracker *t);
 
-/* Whether the hypotheses of a start agree by now.  weight: of the dominant hypothesis. */
-bool hypotheses_agree(const gait_tracker *t, float weight);
+/* End acquisition, if phases are known but for the side, once the hypotheses of a start agree.  weight: of the dominant
+ * hypothesis. */
+void hypotheses_agree(gait_tracker *t, float weight);
 
 /* Whether acquisition has lasted long enough, or the person walks on after standing still; lay the particles out as two
  * hypotheses.  The weights must be even, as after resampling.  Clears the templates. */
@@ -52,6 +54,10 @@ bool hypotheses_resample(gait_tracker *t, uint32_t counter);
 /* Multiply the weights of the particles by the tempered likelihood exp(loglik), those of two hypotheses by their
  * evidence.  dt: seconds since the last frame. */
 pf_summary hypotheses_update(gait_tracker *t, float dt);
+
+/* Share of a frame's log-likelihood that counts, `seconds` after the last frame: its errors are correlated over config
+ * evidence_time. */
+float hypotheses_evidence_share(const gait_tracker *t, float seconds);
 
 /* Left and right are not yet known. */
 bool hypotheses_open(const gait_tracker *t);

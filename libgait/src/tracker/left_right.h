@@ -1,14 +1,15 @@
 /* left_right.h - check that the keypoints show the left leg where the estimate has it.
  *
- * A person seen from the side and their mirror image half a stride later have the same outline, so images hardly
- * distinguish them.  A detector that swaps the sides now and then is weaker evidence than it seems: if many of its frames
- * fit the mirror image better, left and right are open. */
+ * Once left and right are known, only the keypoints compare the estimate with its mirror image, half a stride later.  The
+ * odds begin with those at which left and right are reported as known.  A frame counts as in the odds between two
+ * hypotheses: little if the detector may have swapped the sides, and less if the last frame is recent. */
 #ifndef GAIT_TRACKER_LEFT_RIGHT_H
 #define GAIT_TRACKER_LEFT_RIGHT_H
 #include "tracker/tracker_state.h"
 
-/* The running margin of left and right after this frame: negative if more than a quarter of the keypoints' recent
- * evidence is for the mirror image.  restart: the person has just been found; of: the class of the estimate.  A person
- * who stands still has no left and right that could be swapped. */
-float left_right_update(gait_tracker *t, bool restart, const state_layout *of, const particle_state *mean);
+/* Log odds of the sides of the estimate after this frame, `dt` seconds after the last: negative if the mirror image is more
+ * probable.  restart: left and right have just become known, or are open; of: the class of the estimate.  A person who
+ * stands still has no left and right that could be swapped. */
+float left_right_update(gait_tracker *t, bool restart, float dt, const state_layout *of,
+                        const particle_state *mean);
 #endif

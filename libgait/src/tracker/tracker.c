@@ -116,7 +116,7 @@ void tracker_start(gait_tracker *t, const gait_hypothesis *h, int32_t count, boo
         hypotheses_require_proof(t);
     if (!known)
         hypotheses_acquire(t);
-    else if (n > 1)
+    else if (!sure)
         hypotheses_compare(t);
     else
         hypotheses_settle(t);
@@ -294,7 +294,7 @@ static void check_estimate(gait_tracker *t, float dt, bool lost, const state_lay
     if (lost && !(left_right && v.phase_as_predicted))
         hypotheses_acquire(t);
     core->front_back_margin = front_back_update(t, lost || !core->found, of, mean);
-    core->left_right_margin = left_right_update(t, lost || !core->found, of, mean);
+    core->left_right_margin = left_right_update(t, lost || !core->found || hypotheses_open(t), dt, of, mean);
     core->fit_margin = fit_check_update(t, lost || !core->found, of, mean);
     if (t->classes)
         class_strata_support(t, of->model->motion_class, mean);
@@ -393,8 +393,7 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
         walk_check_update(t, &mean);
         check_estimate(t, dt, lost, &t->layouts[e.motion_class], &mean);
     }
-    if (hypotheses_agree(t, e.hypothesis_weight))
-        hypotheses_settle(t);
+    hypotheses_agree(t, e.hypothesis_weight);
     bool const few = s.degenerate || s.ess < DEGENERATE_ESS; /* particles with weight */
     e.status = s.degenerate ? GAIT_TRACK_LOST : status_of(t, dt, &e);
     e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (has_image ? 0 : GAIT_EST_NO_IMAGE) |

@@ -14,8 +14,9 @@
 enum { HYPOTHESES_ONE, HYPOTHESES_ACQUISITION, HYPOTHESES_TWO };
 typedef struct hypotheses_state {
     int32_t stage;
-    int32_t left_right_known; /* left and right have been decided before */
-    int64_t since;            /* when the stage began, microseconds */
+    int32_t left_right_known;    /* left and right have been decided before */
+    int32_t phase_known, agreed; /* in acquisition: but for the side; the hypotheses of the start agree */
+    int64_t since;               /* when the stage began, microseconds */
     /* Of the second hypothesis over the first (HYPOTHESES_TWO); before the images have proven an automatic start: of a
      * person over no person, at most 0. */
     double log_odds;
@@ -38,7 +39,7 @@ typedef struct tracker_core {
     float stature_sd_ratio;  /* standard deviation of stature at the start, fraction of the stature */
     float usual_unexplained; /* foreground that the estimate usually leaves unexplained, nats */
     float front_back_margin; /* running mean of front_back_score() */
-    float left_right_margin; /* running mean of the keypoints' evidence against the mirror image */
+    float left_right_margin; /* log odds of the estimate's sides over the mirror image (left_right.h) */
     float fit_margin;        /* running mean of fit_check_score() */
     double ess;
     hypotheses_state hypotheses;

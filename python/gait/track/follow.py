@@ -24,7 +24,7 @@ _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is 
 _OPEN_PHASE = 0.2  # strides; sd of the phase from which a start does not determine left and right
 _SETTLED_S = 0.2  # seconds of status `tracking` after which they are known
 _SETTLES = 4.0  # seconds after a start within which that must happen
-_DRAWS = 3  # draws of particles that must agree
+_DRAWS = 3  # draws of particles that must agree, if the phase is open
 _SAME_SIDE = 0.2  # strides between the phases of draws that agree
 _DISAGREE = "repeated starts disagree about left and right"
 
@@ -101,8 +101,8 @@ class Follower:
         Estimates of frames before a start come from the tracker running backwards from it.
         """
         start = self._settled(start, frames)
-        given, before = self._earlier(start, frames.start)
-        first, before = self._first(given, before, frames.start)
+        given, before = self._earlier(start, frames)
+        first, before = self._first(given, before, frames)
         following: Start | None = first
         now: Estimate | None = None
         lost = True
@@ -122,7 +122,7 @@ class Follower:
                 stop = frames.stop if following is None else following.frame
                 found = self._find_again(frame.number + 1, stop, now.mean.stature)
                 if found is not None:
-                    following, more = self._earlier(found, frame.number + 1)
+                    following, more = self._earlier(found, range(frame.number + 1, frames.stop))
                     before |= more
             estimate = replace(now, status=TrackStatus.LOST) if lost else now
             yield frame, before.get(frame.number, estimate) if lost else estimate
@@ -132,7 +132,7 @@ class Follower:
                 now, lost, support = None, False, _Support(frame)
 
     def _settled(self, start: Start, frames: range) -> Start:
-        """If a start does not determine left and right, move it to a later or earlier frame where images do.
+        """If a start leaves the phase open, move it to a frame where left and right are known.
 
         Several draws of particles decide; unless they agree, left and right stay uncertain throughout.
         """
@@ -140,9 +140,20 @@ class Follower:
             return start
         draws = [self._draw(start, frames, draw) for draw in range(_DRAWS)]
         found = [one for one in draws if one is not None]
-        agreeing = [sum(_same_side(one, other, self._video.fps) for other in found) for one in found]
+        agreeing = [sum(_apart(one, other, self._video.fps) < _SAME_SIDE for other in found) for one in found]
         self._uncertain = bool(found) and (len(found) < 2 or min(agreeing) < len(found))
         return found[int(np.argmax(agreeing))] if found else start
+
+    def _sided(self, start: Start, frames: range) -> Start:
+        """Decide left and right of a start with a known phase that was found in the clip.
+
+        Its keypoints may be swapped throughout the second from which it was found, so the tracker leaves the
+        sides open; one draw of particles decides.
+        """
+        if not start.hypotheses or start.sd.phase >= _OPEN_PHASE:
+            return start
+        decided = self._draw(start, frames, 0)
+        return start if decided is None else _with_side(start, decided, self._video.fps)
 
     def _draw(self, start: Start, frames: range, draw: int) -> Start | None:
         """Return a start where one draw of particles has decided; None if it does not soon."""
@@ -177,19 +188,19 @@ class Follower:
         return None
 
     def _first(
-        self, start: Start, before: dict[int, Estimate], first: int
+        self, start: Start, before: dict[int, Estimate], frames: range
     ) -> tuple[Start, dict[int, Estimate]]:
         """Find an earlier start, if the person was in view earlier and then absent, or keep this one.
 
-        `before`: estimates up to the start; `first`: first frame to track.
+        `before`: estimates up to the start; `frames`: frames to track.
         """
         stop = min(before, default=start.frame)
-        if stop - first < _LEAST_BEFORE * self._video.fps:
+        if stop - frames.start < _LEAST_BEFORE * self._video.fps:
             return start, before
-        found = self._find_again(first, stop, start.mean.stature)
+        found = self._find_again(frames.start, stop, start.mean.stature)
         if found is None:
             return start, before
-        found, more = self._earlier(found, first)
+        found, more = self._earlier(found, frames)
         return found, before | more
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
@@ -211,9 +222,10 @@ class Follower:
             tracker.start(start.mean, start.sd, utime)
         self._plausibility.restart()
 
-    def _earlier(self, start: Start, first: int) -> tuple[Start, dict[int, Estimate]]:
-        """Return where to start, and the estimates of the frames from `first` to there."""
-        before = self._backwards(start, first) if first < start.frame else {}
+    def _earlier(self, start: Start, frames: range) -> tuple[Start, dict[int, Estimate]]:
+        """Return where to start, and the estimates of the frames from the first of `frames` to there."""
+        start = self._sided(start, frames)
+        before = self._backwards(start, frames.start) if frames.start < start.frame else {}
         if not self._one_pass:
             return start, before
         sure = [number for number, now in before.items() if now.status == TrackStatus.TRACKING]
@@ -242,12 +254,26 @@ class Follower:
         return {n: now for n, now in sorted(found.items()) if earliest <= n < start.frame}
 
 
-def _same_side(one: Start, other: Start, fps: float) -> bool:
-    """Whether two starts of the same walk agree in phase."""
+def _apart(one: Start, other: Start, fps: float) -> float:
+    """Strides by which two starts of the same walk differ in phase."""
     seconds = (other.frame - one.frame) / fps
     rate = (one.mean.stride_hz + other.mean.stride_hz) / 2
     off = other.mean.phase - one.mean.phase - rate * seconds
-    return abs((off + 0.5) % 1 - 0.5) < _SAME_SIDE
+    return abs((off + 0.5) % 1 - 0.5)
+
+
+def _with_side(start: Start, decided: Start, fps: float) -> Start:
+    """Choose the most probable hypothesis of a start in the direction of a walk, with the decided side.
+
+    Where no hypothesis walks in that direction, the start is where the walk was decided.
+    """
+    for one in start.hypotheses:
+        if np.cos(one.mean.heading - decided.mean.heading) > 0:
+            found = replace(start, mean=one.mean, sd=one.sd, in_place=one.in_place, hypotheses=())
+            if _apart(found, decided, fps) < 0.25:
+                return found
+            return replace(found, mean=replace(one.mean, phase=(one.mean.phase + 0.5) % 1))
+    return decided
 
 
 def _start_from(now: Estimate, frame: int, start: Start) -> Start:

@@ -7,6 +7,7 @@ other people's keypoints, and the detector's jumps.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints
+from gait.body.skeleton import other_sides
 from gait.camera.camera import Camera
 from gait.io.video import Frame
 
@@ -120,8 +122,11 @@ class PersonKeypoints:
         keypoints = self.choose(frame, estimate)
         if keypoints is None:
             return False
-        legs = self._distances(frame, estimate, keypoints, _LEG_JOINTS)
-        return not len(legs) or bool(legs.mean() < _AGREE)
+        # the tracker judges left and right; a detector confuses them in single frames
+        names = tuple(keypoints.names)
+        swapped = replace(keypoints, names=tuple(names[k] for k in other_sides(names)))
+        legs = [self._distances(frame, estimate, one, _LEG_JOINTS) for one in (keypoints, swapped)]
+        return not len(legs[0]) or bool(min(distances.mean() for distances in legs) < _AGREE)
 
     def _views(self, frame: Frame) -> Iterator[tuple[PersonKeypoints, Frame]]:
         """Yield the views of further cameras at the time of a frame."""
