@@ -307,7 +307,7 @@ lowest: setup lib tools ## Python tests with the lowest numpy and scipy that pyp
 	@PYTHONPATH='$(abspath build/lowest)' $(MAKE) --no-print-directory python-test
 
 asan: ## C tests under the address and undefined-behaviour sanitizers
-	@LIMIT=1200 $(MAKE) --no-print-directory config=sanitize unit
+	@LIMIT=1200 $(MAKE) --no-print-directory $(JOBS) config=sanitize unit
 
 # Tests that share data among threads; the others have one thread.
 THREADED := $(patsubst %,$(B)/unit/test_%,pool task determinism)
