@@ -12,6 +12,8 @@ from gait import Model, Tracker, TrackerConfig, TrackStatus, Video
 from gait.bindings.frame import FrameKeypoints
 from gait.bindings.initial import Start
 from gait.bindings.model import read_blob
+from gait.bindings.start_fit import Hypothesis
+from gait.body.skeleton import other_sides
 from gait.cli import main
 from gait.io import blob, keypoints_file, video
 from gait.io.track_file import read_track
@@ -371,6 +373,50 @@ def test_legs_that_keypoints_show_elsewhere_are_no_agreement(estimate):
     people = PersonKeypoints(camera(), {0: {0: found(joints=astride)}}, 0)
     frame = Frame(0, 0.0, FRAMES[-1])
     assert people.choose(frame, estimate) is not None and people.agree(frame, estimate) is False
+
+
+def test_swapped_legs_agree(estimate):
+    """The tracker judges left and right; a detector swaps them in single frames."""
+    people = PersonKeypoints(camera(), {0: {0: found(joints=JOINTS[-1][other_sides(MODEL.joint_names)])}}, 0)
+    assert people.agree(Frame(0, 0.0, FRAMES[-1]), estimate) is True
+
+
+class Walks(Script):
+    """A tracker of a steady walk, which records the phases of its starts; those of hypotheses are open."""
+
+    def like(self, config):
+        return Walks(self.estimate, self.leaves, self.starts)
+
+    def start(self, mean, sd, utime):
+        self.starts.append(mean.phase)
+
+    def start_hypotheses(self, hypotheses, utime):
+        self.starts.append(None)
+
+    def step(self, image, utime, keypoints, poses, backgrounds, people):
+        now = super().step(image, utime, keypoints, poses, backgrounds, people)
+        mean = self.estimate.mean
+        return replace(now, mean=replace(mean, phase=(0.1 + mean.stride_hz * utime / 1e6) % 1))
+
+
+@pytest.mark.parametrize(("phase", "turn", "wanted"), [(0.12, 0, 0.12), (0.62, 0, 0.12), (0.12, np.pi, None)])
+def test_a_start_has_the_side_that_was_decided(estimate, phase, turn, wanted):
+    """If the hypothesis walks the other way, the track starts where the walk was decided, frame 6."""
+    mean = replace(estimate.mean, phase=phase, heading=estimate.mean.heading + turn)
+    one = Hypothesis(mean, estimate.sd, 1.2, 0.1, 1.0, 1.0, False, True, np.eye(6))
+    people = PersonKeypoints(camera(), {1: {n: found() for n in range(20)}}, 1)
+    starts = []
+    follower = Follower(
+        Walks(estimate, -1, starts),
+        Film(),
+        people,
+        Plausibility(people, 1.75, 0.05, 0.0, FORWARDS),
+        lambda *_: None,
+    )
+    rows = list(follower.follow(Start(0, mean, estimate.sd, hypotheses=(one,)), range(20)))
+    assert len(rows) == 20 and starts[0] is None
+    begin = 0.1 + 6 * estimate.mean.stride_hz / 30 if wanted is None else wanted
+    assert starts[-1] == pytest.approx(begin, abs=1e-3)
 
 
 @pytest.mark.parametrize(
