@@ -8,8 +8,8 @@ static void fill_frame(gait_frame *frame, gait_image *image, fuzz_bytes *b, uint
 {
     *image =
         (gait_image){image->data, FUZZ_WIDTH, FUZZ_HEIGHT, FUZZ_WIDTH * 3, what % 8 ? GAIT_RGB8 : GAIT_GREY8};
-    if (what % 8 ==
-        1) { /* must be refused, or stay within its memory; that a stride is too long cannot be seen */
+    if (what % 8 == 1) {
+        /* Must be refused, or stay within its memory; that a stride is longer than the memory cannot be seen. */
         image->width = (int32_t)fuzz_word(b);
         image->stride = (int32_t)fuzz_word(b);
         image->stride = image->stride < FUZZ_WIDTH * 3 ? image->stride : FUZZ_WIDTH * 3;
