@@ -163,15 +163,26 @@ $(READY): python/lock.txt python/pyproject.toml
 	    'pages is not tested; run `$(PY) tests/python/accessibility.py` later' >&2
 	@pwd -P > $@
 
+# Programs that make lock files and lists of components, apart from what they list.
+PACKAGING := build/packaging
+$(PACKAGING)/.ready: python/lock-packaging.txt
+	$(PYTHON) -m venv --clear $(@D)
+	$(@D)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r $<
+	@touch $@
+
 # Exact versions with the hashes of their files, of everything that constraints.txt and what it needs bring, on every
-# Python and CPU.
-LOCK := $(VENV)/bin/uv pip compile --quiet --universal --generate-hashes --no-header --no-annotate \
-        --no-emit-package libgait --constraint python/constraints.txt
-lock: setup ## generate python/lock.txt and lock-docs.txt from constraints.txt (needs a network)
-	$(PIP_INSTALL) uv
+# Python and CPU; and of the packages that other targets install elsewhere.
+LOCK_ALONE := $(PACKAGING)/bin/uv pip compile --quiet --universal --generate-hashes --no-header --no-annotate
+LOCK := $(LOCK_ALONE) --no-emit-package libgait --constraint python/constraints.txt
+LOWEST = $$(grep -oE '"(numpy|scipy)>=[0-9.]+' python/pyproject.toml | sed 's/"//; s/>=/==/' | sort -u)
+lock: $(PACKAGING)/.ready ## generate the lock files from constraints.txt and pyproject.toml (needs a network)
 	$(LOCK) --python-version 3.10 python/pyproject.toml --extra dev --output-file python/lock.txt
 	printf '%s\n' mkdocs-material mkdocstrings-python latex2mathml | $(LOCK) \
 	    --python-version 3.11 - --output-file python/lock-docs.txt
+	printf '%s\n' uv==0.13.9 cyclonedx-bom==7.5.0 | $(LOCK_ALONE) \
+	    --python-version 3.10 - --output-file python/lock-packaging.txt
+	printf '%s\n' $(LOWEST) | $(LOCK_ALONE) --no-deps --python-version 3.10 - --output-file python/lock-lowest.txt
+	$(LOCK_ALONE) --python-version 3.10 tests/bench/requirements-peers.txt --output-file tests/bench/lock-peers.txt
 
 # An environment does not survive being moved.
 MOVED := $(shell test -h $(VENV) || test ! -f $(READY) || test "$$(cat $(READY))" = "$$(pwd -P)" || rm $(READY))
@@ -302,8 +313,7 @@ python-test: setup lib tools ## all Python tests (ARGS='-k blob' or '-m long' to
 	@$(COMPILED_ONCE) $(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) $(MARKED) tests/python $(ARGS)
 
 lowest: setup lib tools ## Python tests with the lowest numpy and scipy that pyproject.toml allows (ARGS='-k blob' to select)
-	$(PIP_INSTALL) --upgrade --no-deps --target build/lowest \
-	    $$(grep -oE '"(numpy|scipy)>=[0-9.]+' python/pyproject.toml | sed 's/"//; s/>=/==/' | sort -u)
+	$(PIP_INSTALL) --upgrade --no-deps --require-hashes --target build/lowest -r python/lock-lowest.txt
 	@PYTHONPATH='$(abspath build/lowest)' $(MAKE) --no-print-directory python-test
 
 asan: ## C tests under the address and undefined-behaviour sanitizers
@@ -481,9 +491,9 @@ eval: setup lib ## errors on the clips, compared with their targets *
 
 # Other packages to compare with, in an environment of their own; without a network they are left out.
 PEERS := build/peers/.ready
-$(PEERS): tests/bench/requirements-peers.txt | $(READY)
+$(PEERS): tests/bench/lock-peers.txt | $(READY)
 	@$(PY) -m venv --clear $(@D) && \
-	    $(@D)/bin/pip install --quiet --disable-pip-version-check -r $< && touch $@ || \
+	    $(@D)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@ || \
 	    { rm -rf $(@D); echo 'eval-learn: other packages cannot be installed and are left out' >&2; }
 
 eval-learn: setup lib $(PEERS) ## learning compared with other packages: tests/bench/results/learn.md *
@@ -578,11 +588,9 @@ screenshots: setup lib ## the figures of the pages and the tutorial's pictures, 
 C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] tests/python/*.c \
            tools/trackd/*.[ch]))
 SBOM := build/sbom
-sbom: setup ## all components with versions, hashes and licences (CycloneDX): build/sbom/libgait.cdx.json
+sbom: setup $(PACKAGING)/.ready ## all components with versions, hashes and licences (CycloneDX): build/sbom/libgait.cdx.json
 	@mkdir -p $(SBOM)
-	@test -x $(SBOM)/venv/bin/cyclonedx-py || { $(PYTHON) -m venv $(SBOM)/venv && \
-	    $(SBOM)/venv/bin/pip install --quiet --disable-pip-version-check 'cyclonedx-bom==7.5.0'; }
-	@$(SBOM)/venv/bin/cyclonedx-py environment $(VENV)/bin/python --pyproject python/pyproject.toml --mc-type library \
+	@$(PACKAGING)/bin/cyclonedx-py environment $(VENV)/bin/python --pyproject python/pyproject.toml --mc-type library \
 	    --output-reproducible --output-file $(SBOM)/packages.json 2>$(SBOM)/log || { cat $(SBOM)/log >&2; exit 1; }
 	@$(PY) tools/sbom.py $(SBOM)/packages.json -o $(SBOM)/libgait.cdx.json
 

@@ -16,6 +16,7 @@ else:
     import tomli as tomllib
 
 PYTHON = Path(__file__).resolve().parents[2] / "python"
+BENCH = PYTHON.parent / "tests/bench"
 PROJECT = tomllib.loads((PYTHON / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 OPTIONAL = PROJECT["optional-dependencies"]
 IMPORTED = {
@@ -51,18 +52,48 @@ def test_every_package_has_an_exact_version_for_development():
     assert required <= exact
 
 
+def locked(path):
+    """Versions in a lock file, each with the hashes of its files."""
+    versions = set()
+    for entry in re.split(r"\n(?=\S)", path.read_text(encoding="utf-8").strip()):
+        version, *hashes = re.split(r"\s*\\\n\s*", entry)
+        assert hashes and all(re.fullmatch(r"--hash=sha256:[0-9a-f]{64}", h) for h in hashes), version
+        versions.add(version.partition(" ;")[0].lower())
+    return versions
+
+
+def exact_versions(path):
+    """Lines PACKAGE==VERSION of a file of requirements."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return {line.partition(";")[0].strip().lower() for line in lines if "==" in line}
+
+
 def test_the_lock_has_these_versions_with_the_hashes_of_their_files():
     """`make lock` was run after the last change of constraints.txt."""
-    locked = set()
-    for name in ("lock.txt", "lock-docs.txt"):
-        for entry in re.split(r"\n(?=\S)", (PYTHON / name).read_text(encoding="utf-8").strip()):
-            version, *hashes = re.split(r"\s*\\\n\s*", entry)
-            assert hashes and all(re.fullmatch(r"--hash=sha256:[0-9a-f]{64}", h) for h in hashes), version
-            locked.add(version.partition(" ;")[0].lower())
-    lines = (PYTHON / "constraints.txt").read_text(encoding="utf-8").splitlines()
-    exact = {line.partition(";")[0].strip().lower() for line in lines if "==" in line}
+    exact = exact_versions(PYTHON / "constraints.txt")
     apart = tuple(name.lower() + "==" for name in packages(OPTIONAL["rerun"]))  # not among those of `dev`
-    assert {version for version in exact if not version.startswith(apart)} <= locked
+    there = locked(PYTHON / "lock.txt") | locked(PYTHON / "lock-docs.txt")
+    assert {version for version in exact if not version.startswith(apart)} <= there
+
+
+def test_what_other_targets_install_is_locked_too():
+    """`make lock` was run after the last change of these versions."""
+    text = (PYTHON / "pyproject.toml").read_text(encoding="utf-8")
+    lowest = {f"{name}=={version}.0" for name, version in re.findall(r'"(numpy|scipy)>=([0-9.]+)', text)}
+    assert locked(PYTHON / "lock-lowest.txt") == lowest
+    peers = BENCH / "requirements-peers.txt"
+    assert exact_versions(peers) <= locked(BENCH / "lock-peers.txt")
+    recipe = (PYTHON.parent / "Makefile").read_text(encoding="utf-8")
+    programs = set(re.findall(r"(?:uv|cyclonedx-bom)==[0-9.]+", recipe))
+    assert len(programs) == 2 and programs <= locked(PYTHON / "lock-packaging.txt")
+
+
+def test_whatever_the_makefile_installs_has_hashes_or_needs_no_packages():
+    recipe = (PYTHON.parent / "Makefile").read_text(encoding="utf-8").replace("\\\n", "")
+    installing = re.findall(r"^\t.*(?:\$\(PIP_INSTALL\)|pip install).*$", recipe, re.MULTILINE)
+    assert len(installing) >= 5
+    for line in installing:
+        assert "--require-hashes" in line or "--no-deps --no-build-isolation -e ./python" in line, line
 
 
 def test_missing_packages_are_named_with_their_extras(monkeypatch):
