@@ -119,8 +119,9 @@ class Followed:
 
     def foot_of_late(self) -> float:
         """Row of the lowest foot within the last stance, pixels."""
-        rows = zip(self.times, self.keypoints, strict=True)
-        return max(nearness(person.uv)[0] for at, person in rows if self.times[-1] - at <= _STANCE)
+        latest_first = zip(reversed(self.times), reversed(self.keypoints), strict=True)
+        stance = itertools.takewhile(lambda row: self.times[-1] - row[0] <= _STANCE, latest_first)
+        return max(nearness(person.uv)[0] for _, person in stance)
 
     def _course_begin(self) -> int:
         """Index of the first frame from which the speed on the course is computed."""
