@@ -10,7 +10,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import AbstractContextManager, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -275,13 +275,19 @@ def peak_kb(pid: int) -> int:
     return int(printed.group(1))
 
 
-@contextmanager
-def daemon(url: str, *options: object) -> Iterator[tuple[Listener, Callable[[], Outcome]]]:
+Daemon = AbstractContextManager[tuple[Listener, Callable[[], Outcome]]]
+
+
+def daemon(url: str, *options: object) -> Daemon:
     """gait-trackd on a network; yields a listener and a function that ends the daemon cleanly."""
+    return started(command("--url", url, *options), url)
+
+
+@contextmanager
+def started(words: Sequence[str], url: str) -> Iterator[tuple[Listener, Callable[[], Outcome]]]:
+    """The same with exactly these words, that make it use `url`."""
     listener = Listener(url)
-    process = subprocess.Popen(
-        command("--url", url, *options), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     listener.pid = process.pid
 
     def finish() -> Outcome:

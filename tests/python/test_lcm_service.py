@@ -179,6 +179,49 @@ def test_a_service_manager_is_reported_and_settings_are_read_again(tmp_path, man
     assert "--particles many: give a whole number" in outcome.words
 
 
+def test_settings_with_which_the_program_could_not_start_are_not_reloaded(tmp_path, manager, monkeypatch):
+    """Each fault is one line, and the same tracker goes on."""
+    config, torn, log, no = (tmp_path / name for name in ("trackd.toml", "torn", "a.log", "no"))
+    torn.write_bytes(b"{")
+    rig.write_log(log, rig.frames(0, 1))
+    model = f'model = "{rig.MODEL}"\n'
+    url = private_url()
+    monkeypatch.setenv("LCM_DEFAULT_URL", url)
+    wrong = {
+        f'model = "{no}.gait"': "cannot open the model file",
+        f'model = "{torn}"': "not a usable model",
+        f'{model}camera = "{no}"': "cannot open the camera file",
+        f'{model}camera = "{torn}"': f"{torn}: ",
+        f'{model}init = "{torn}"': f"{torn}: ",
+        f'{model}snapshot = "{no}/state"': "cannot be written: No such file",
+        f'{model}url = "nonsense://"': "nonsense://: cannot open LCM",
+        f'{model}url = "file://{log}?speed=0"': "a log is played only from the start",
+        f'{model}lift = true\nlift-model = "{no}.gait"': "cannot open the model file",
+        f'{model}out = "file://{no}/out.log?mode=w"': "cannot be written: No such file",
+        f'{model}out = "file://{tmp_path}?mode=w"': "cannot be written: Is a directory",
+        f'{model}out = "nonsense://"': "nonsense://: cannot open LCM",
+        f"{model}version = true": "version is allowed on the command line only",
+    }
+    config.write_text(model)
+    words = [str(rig.TRACKD), "--config", str(config), "-n", str(rig.PARTICLES)]
+    with rig.started(words, url) as (listener, finish):
+        assert manager() == "READY=1"
+        begin(listener)
+        for i, content in enumerate(wrong):
+            feed(listener, i, i + 1)
+            config.write_text(content + "\n")
+            os.kill(listener.pid, signal.SIGHUP)
+            assert manager() == "RELOADING=1" and manager() == "READY=1"
+        last = feed(listener, len(wrong), len(wrong) + 1)
+        assert last.step == len(wrong)  # of one tracker
+        outcome = finish()
+    shown = outcome.words.splitlines()
+    lines = [line for line in shown if " particles, " not in line and "listening" not in line]
+    assert outcome.code == 0 and len(lines) == len(wrong), outcome.words
+    for line, reason in zip(lines, wrong.values(), strict=True):
+        assert line.startswith("gait-trackd: settings were not reloaded: ") and reason in line
+
+
 @pytest.mark.parametrize("words", [["--url", "nonsense://"], ["--particles", "many"]])
 def test_under_a_service_manager_a_daemon_that_cannot_start_ends_after_a_second(words, manager):
     """The manager starts it again at once, however often."""

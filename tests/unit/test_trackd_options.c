@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 static struct values {
-    bool flag;
+    bool flag, version;
     char text[OPTION_TEXT], config[OPTION_TEXT];
     int32_t whole;
     uint64_t seed;
@@ -23,6 +23,7 @@ static const option TABLE[] = {
     {"whole", 0, "N", "a whole number", OPTION_INT, &v.whole, -5, 100},
     {"seed", 0, "N", "any whole number", OPTION_U64, &v.seed, 0, 0},
     {"share", 0, "X", "a float", OPTION_FLOAT, &v.share, 0, 1},
+    {"version", 0, "", "only on the command line", OPTION_FLAG, &v.version, 0, 0},
     {"seconds", 0, "S", "a double", OPTION_DOUBLE, &v.seconds, -1, 1e9},
 };
 enum { COUNT = sizeof TABLE / sizeof *TABLE };
@@ -114,6 +115,7 @@ static void test_bad_files(void)
         {"flag\n", "line 1: 'flag' is not of the form name = value"},
         {"\nother = 1\n", "line 2: unknown option other"},
         {"whole = 1\nwhole = 2\n", "line 2: whole is already given in line 1"},
+        {"version = true\n", "version is allowed on the command line only"},
         {"config = x\n", "config is allowed on the command line only"},
         {"text = \"\n", "give a string in plain quotes"},
         {"text = \"a\n", "give a string in plain quotes"},

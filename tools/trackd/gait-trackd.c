@@ -71,6 +71,18 @@ typedef struct parts { /* optional parts of the service */
     keypoint_cue other_cue[PEOPLE_MOST - 1];
 } parts;
 
+typedef struct instance { /* the service with its settings and all that it needs */
+    settings want;
+    service_shared shared;
+    service service;
+    parts extra;
+    workers threads;
+    snapshot_file snapshot;
+    receiver receiver;
+    sink out;
+    bool trial; /* opened only to see whether it can be: nothing is changed, and only a fault is reported */
+} instance;
+
 /* Open the lifter, if requested. */
 static bool load_lift(service *s, const settings *want, lift_service *lift, sink *out, message *why)
 {
@@ -241,15 +253,66 @@ typedef struct invocation { /* of the program */
     sigset_t unblocked; /* signal mask at the start, and while waiting */
 } invocation;
 
-/* Run until a signal ends the program or new settings are to be used; if these are not valid, continue with the present
- * ones. */
-static bool run(receiver *r, const invocation *call, message *why)
+/* Open everything that the settings name. */
+static bool open_instance(instance *n, message *why)
 {
-    static settings again;
+    const settings *const want = &n->want;
+    service *const s = &n->service;
+    const char *const url = link_url(want->url);
+    const char *const to = want->out[0] ? want->out : link_is_log(url) ? NULL : url;
+    n->snapshot =
+        (snapshot_file){.path = want->snapshot[0] ? want->snapshot : NULL,
+                        .period = (int64_t)(1e6 * (want->snapshot_s > 0 ? (double)want->snapshot_s : 1))};
+    n->shared.quiet = n->trial;
+    s->shared = &n->shared;
+    s->person = want->people ? 1 : want->person;
+    return workers_start(&n->threads, want->threads, why) && snapshot_file_check(&n->snapshot, why) &&
+           load(s, want, &n->extra, &n->threads, &n->out, why) &&
+           receiver_open(&n->receiver, s, &n->snapshot, url, why) &&
+           (!to || n->trial || sink_open(&n->out, to, why)); /* last, as it empties a log */
+}
+
+/* Close it; `ok` as it was, or false if messages were lost. */
+static bool close_instance(instance *n, bool ok, message *why)
+{
+    message lost;
+    receiver_close(&n->receiver);
+    if (!sink_close(&n->out, &lost) && ok)
+        ok = message_set(why, "%s", lost.text);
+    workers_stop(&n->threads);
+    for (service *each = n->service.next; each; each = each->next)
+        service_close(each);
+    service_close(&n->service);
+    service_shared_close(&n->shared);
+    lift_service_close(&n->extra.lift);
+    further_close(&n->extra.further);
+    return ok;
+}
+
+/* Whether the program can start with the settings as they are now: all that they name is opened, and closed again.  `own` is
+ * the output in use. */
+static bool can_reload(const invocation *call, const sink *own, message *why)
+{
+    static instance next;
+    memset(&next, 0, sizeof next);
+    next.trial = true;
+    if (settings_read(&next.want, call->argc, call->argv, why) != OPTION_OK)
+        return false;
+    const char *const url = link_url(next.want.url), *const to = next.want.out[0] ? next.want.out : url;
+    if (link_is_log(url))
+        return message_set(why, "--url %.160s: a log is played only from the start of the program", url);
+    bool const ok = sink_check(to, own, why) && open_instance(&next, why);
+    return close_instance(&next, ok, why);
+}
+
+/* Run until a signal ends the program or new settings are to be used; if the program could not start with these, continue
+ * with the present ones. */
+static bool run(instance *n, const invocation *call, message *why)
+{
     message bad;
-    while (receiver_run(r, &quit, &call->unblocked, why)) {
+    while (receiver_run(&n->receiver, &quit, &call->unblocked, why)) {
         manager_report(quit == RELOAD ? "RELOADING=1" : "STOPPING=1");
-        if (quit != RELOAD || settings_read(&again, call->argc, call->argv, &bad) == OPTION_OK)
+        if (quit != RELOAD || can_reload(call, &n->out, &bad))
             return true;
         log_line("settings were not reloaded: %s", bad.text);
         manager_report("READY=1");
@@ -258,32 +321,22 @@ static bool run(receiver *r, const invocation *call, message *why)
     return false;
 }
 
-/* Run the service with these settings, from opening its parts to the summary. */
-static bool serve(service *s, const settings *want, parts *p, workers *threads, const invocation *call,
-                  message *why)
+/* Run the service with its settings, from opening it to the summary. */
+static bool serve(instance *n, const invocation *call, message *why)
 {
+    service *const s = &n->service;
+    const settings *const want = &n->want;
     const char *const url = link_url(want->url);
-    bool const log = link_is_log(url);
-    snapshot_file snapshot = {.path = want->snapshot[0] ? want->snapshot : NULL,
-                              .period =
-                                  (int64_t)(1e6 * (want->snapshot_s > 0 ? (double)want->snapshot_s : 1))};
-    const char *const to = want->out[0] ? want->out : log ? NULL : url;
-    receiver r = {0};
-    sink out = {0};
-    message lost;
-    s->person = want->people ? 1 : want->person;
-    bool const ready = snapshot_file_check(&snapshot, why) && load(s, want, p, threads, &out, why) &&
-                       receiver_open(&r, s, &snapshot, url, why) &&
-                       (!to || sink_open(&out, to, why)); /* last, as it empties a log */
+    bool const log = link_is_log(url), ready = open_instance(n, why);
     if (ready)
-        snapshot_file_resume(&snapshot, s);
+        snapshot_file_resume(&n->snapshot, s);
     if (ready && !log && !want->quiet)
         log_line("listening on %s", url);
     if (ready)
         manager_report("READY=1");
-    bool ok = ready && run(&r, call, why);
+    bool ok = ready && run(n, call, why);
     if (ok) {
-        snapshot_file_write(&snapshot, s, true);
+        snapshot_file_write(&n->snapshot, s, true);
         for (service *each = s; each; each = each->next) {
             service_send_status(each);
             if (want->people && !want->quiet)
@@ -294,10 +347,7 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     }
     if (ok && log)
         ok = check_log(url, s, why);
-    receiver_close(&r);
-    if (!sink_close(&out, &lost) && ok)
-        ok = message_set(why, "%s", lost.text);
-    return ok;
+    return close_instance(n, ok, why);
 }
 
 /* A service manager starts the program again at once, as after a crash: do not spin. */
@@ -311,38 +361,24 @@ static int failed(const message *why, int code)
 
 int main(int argc, char **argv)
 {
-    static settings want;
-    static service_shared shared;
-    static service s = {.shared = &shared};
-    static parts extra;
-    static workers threads;
+    static instance only;
     invocation call = {.argc = argc, .argv = argv};
     message why;
-    option_result const result = settings_read(&want, argc, argv, &why);
+    option_result const result = settings_read(&only.want, argc, argv, &why);
     if (result == OPTION_HELP)
         settings_help();
     if (result == OPTION_BAD)
         return failed(&why, 2);
     if (result == OPTION_HELP)
         return 0;
-    if (want.version) {
+    if (only.want.version) {
         uint32_t const v = gait_version();
         printf("gait-trackd %u.%u.%u jpeg %s\n", v / 10000, v / 100 % 100, v % 100,
                jpeg_supported() ? "yes" : "no");
         return 0;
     }
     set_signals(&call.unblocked);
-    bool ok = workers_start(&threads, want.threads, &why);
-    if (ok) {
-        ok = serve(&s, &want, &extra, &threads, &call, &why);
-        workers_stop(&threads);
-        for (service *each = s.next; each; each = each->next)
-            service_close(each);
-        service_close(&s);
-        service_shared_close(&shared);
-        lift_service_close(&extra.lift);
-        further_close(&extra.further);
-    }
+    bool ok = serve(&only, &call, &why);
     if (ok && quit == RELOAD) {
         sigprocmask(SIG_SETMASK, &call.unblocked, NULL);
         fflush(stdout);

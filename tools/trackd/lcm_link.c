@@ -195,6 +195,8 @@ const char *link_channel(const char *channel, int person, char name[LINK_CHANNEL
 }
 
 /* ---- output ---- */
+#define TAKEN "--out %.160s: another program is writing this log; give another name"
+
 /* Lock a log before it is emptied; a kill releases the lock.  Only files are locked; what else cannot be opened is reported
  * when the log is. */
 static bool lock(sink *s, const char *path, message *why)
@@ -205,7 +207,7 @@ static bool lock(sink *s, const char *path, message *why)
         flock(s->lock, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)
         return true;
     close(s->lock);
-    return message_set(why, "--out %.160s: another program is writing this log; give another name", path);
+    return message_set(why, TAKEN, path);
 }
 
 bool sink_open(sink *s, const char *url, message *why)
@@ -226,6 +228,29 @@ bool sink_open(sink *s, const char *url, message *why)
     if (s->lock >= 0)
         close(s->lock);
     return false;
+}
+
+bool sink_check(const char *url, const sink *own, message *why)
+{
+    char path[LINK_PATH];
+    (void)link_log(url, path);
+    if (!link_is_log(url)) {
+        lcm_t *const lcm = link_open(url, why);
+        if (lcm)
+            lcm_destroy(lcm);
+        return lcm != NULL;
+    }
+    int const file = open(path, O_WRONLY | O_CLOEXEC | O_NONBLOCK); /* ENXIO: a pipe that no one reads yet */
+    int fault = file >= 0 || errno == ENXIO ? 0 : errno;
+    if (fault == ENOENT)
+        fault = folder_fault(path);
+    bool const taken = file >= 0 && strcmp(path, own->path) != 0 && flock(file, LOCK_EX | LOCK_NB) != 0 &&
+                       errno == EWOULDBLOCK;
+    if (file >= 0)
+        close(file);
+    if (taken)
+        return message_set(why, TAKEN, path);
+    return !fault || message_set(why, "%.160s: this log cannot be written: %s", path, strerror(fault));
 }
 
 static void lost(sink *s, const char *what)

@@ -44,6 +44,8 @@ typedef struct sink {     /* all zero: no output */
 
 /* Open `url`; a log has ?mode=w (new) or a (append), and no other writer. */
 bool sink_open(sink *s, const char *url, message *why);
+/* Whether `url` could be opened by a program that ends the use of `own`, the output in use; changes nothing. */
+bool sink_check(const char *url, const sink *own, message *why);
 /* Publish `size` bytes on the channel of a person, 0: of all.  The first failure of LCM is reported on stderr; after
  * a failure of a log nothing more is written. */
 void sink_publish(sink *s, const char *channel, int person, const uint8_t *bytes, int size);

@@ -123,15 +123,14 @@ static char *trim(char *s)
 }
 
 typedef struct options_source { /* the file being read */
-    const char *path;
-    int number;              /* of the line */
-    int given[OPTIONS_MOST]; /* line that sets an option; 0: none */
+    int number;                 /* of the line */
+    int given[OPTIONS_MOST];    /* line that sets an option; 0: none */
 } options_source;
 
 /* Whether this line may set the option. */
 static bool claim(options_source *file, const option *o, int *given, message *why)
 {
-    if (o->value == file->path)
+    if (strcmp(o->name, "config") == 0 || strcmp(o->name, "version") == 0)
         return message_set(why, "%s is allowed on the command line only", o->name);
     if (*given)
         return message_set(why, "%s is already given in line %d; remove one", o->name, *given);
@@ -203,7 +202,7 @@ bool options_file(const option *table, int count, const char *path, message *why
     file_bytes bytes;
     message bad;
     bool ok = true;
-    options_source file = {.path = path};
+    options_source file = {0};
     if (!file_read(path, "configuration", FILE_MOST, &bytes, why))
         return false;
     if (!is_text(&bytes)) {

@@ -198,6 +198,8 @@ bool service_make_trackers(service *s, message *why)
     char trackers[32] = "tracker";
     if (people > 1)
         snprintf(trackers, sizeof trackers, "each of %d trackers", people);
+    if (c->quiet)
+        return true;
     log_event("model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
               "%s %zu, pool %zu, pictures %zu)",
               t->info.digest, camera->width, camera->height, t->config.particles, c->threads,

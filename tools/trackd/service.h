@@ -55,6 +55,7 @@ typedef struct service_shared {
     further *further;      /* further cameras; NULL: there is one */
     int32_t max_pixels;    /* of all cameras that are announced, together */
     message refused;       /* why the camera that was announced last cannot be used */
+    bool quiet;            /* the trackers are not reported when they are made */
     bool compared;         /* the background has been compared with a frame */
     frame_hold hold;       /* the frame that waits for keypoints, a pose or further cameras */
     int64_t arrived;       /* frames since the program started */
