@@ -203,6 +203,72 @@ def test_damaged_messages_are_left_out_and_reported(estimates, tmp_path):
     assert len(run.frame) == COUNT and "a message is skipped" in run.remark
 
 
+WRONG = (
+    {"joints": lambda joints: joints[:10], "njoints": 10},
+    {"joints": [], "njoints": 0},
+    {"angles": [], "nangles": 0},
+    {"status": 99},
+    {"status": -1},
+    {"log_evidence": float("nan")},
+    {"speed": -1e38},
+    {"ess": -5.0},
+    {"mode_mass": float("inf")},
+    {"mean": lambda mean: spoilt(mean, heading=float("nan"))},
+    {"mean": lambda mean: spoilt(mean, ncoef=10**9)},
+    {"mean": lambda mean: spoilt(mean, coef=[3e38] * 16)},
+    {"sd": lambda sd: spoilt(sd, stature=-1.0)},
+    {"joints": lambda joints: [spoilt(joints[0], position=[3e38] * 3), *joints[1:]]},
+    {"joints": lambda joints: [spoilt(joints[0], position=[float("nan")] * 3), *joints[1:]]},
+    {"joints": lambda joints: [spoilt(joints[0], sd=[-1.0] * 3), *joints[1:]]},
+    {"angles": lambda angles: [spoilt(angles[0], angle=float("inf")), *angles[1:]]},
+    {"frame": 2**62},
+    {"frame": -2},
+    {"step": 2**62},
+)
+
+
+def spoilt(message, **changes):
+    """A message with other fields; a function gets the old value."""
+    other = copy(message)
+    for name, value in changes.items():
+        setattr(other, name, value(getattr(other, name)) if callable(value) else value)
+    return other
+
+
+def test_messages_that_no_track_may_contain_are_left_out(estimates, tmp_path):
+    """Each could be decoded; any of them may be the first, or the last."""
+    for k in range(0, len(WRONG), 10):
+        events = list(estimates)
+        for place, change in enumerate(WRONG[k : k + 10]):
+            events.insert(2 * place, spoilt(estimates[place], **change))
+        events.append(spoilt(estimates[-1], **WRONG[k]))
+        log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in events])
+        words = ["--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--log", tmp_path / "e.log"]
+        done = rig.gait("record", *words, "--json")
+        assert done.returncode == 0 and "messages skipped: 11, first: " in done.stderr
+        assert json.loads(done.stdout)["damaged"] == 11 and json.loads(done.stdout)["lost"] == 0
+        assert len(read_track(tmp_path / "t.csv").frame) == COUNT
+        assert read_run(str(tmp_path / "e.log")).remark is None and len(read_run(str(log)).frame) == COUNT
+
+
+def test_wrong_classes_are_left_out(estimates, tmp_path):
+    def classes(of, **changes):
+        message = gaitmsg.classes_t()
+        message.utime, message.nclasses, message.most_probable = of.utime, 2, 1
+        message.name, message.probability = ["walk", "stand"], [0.25, 0.75]
+        return spoilt(message, **changes)
+
+    changes = [{"most_probable": 2}, {"probability": [float("nan"), 1.0]}, {"name": ["walk", "fly"]}]
+    events = [(channel, e) for e in estimates for channel in ("GAIT_CLASSES", "GAIT_ESTIMATE")]
+    events = [(channel, classes(e) if channel == "GAIT_CLASSES" else e) for channel, e in events]
+    for k, change in enumerate(changes, 3):
+        events[2 * k] = "GAIT_CLASSES", classes(estimates[k], **change)
+    log = rig.write_log(tmp_path / "in.log", events)
+    done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv")
+    assert done.returncode == 0 and "messages skipped: 3, first: GAIT_CLASSES: " in done.stderr
+    assert read_track(tmp_path / "t.csv").motion_class == [*["stand"] * 3, *[""] * 3, *["stand"] * 14]
+
+
 def test_a_log_played_again_is_another_stream(estimates, tmp_path):
     done, frames = record(tmp_path, [*estimates, *estimates])
     assert done.returncode == 0 and "another stream began" in done.stderr and len(frames) == COUNT

@@ -409,11 +409,11 @@ def spoilt(message, **changes):
 @pytest.mark.parametrize(
     ("estimate", "image", "words"),
     [
-        ({"joints": [], "njoints": 0}, {}, "other joints"),
+        ({"joints": [], "njoints": 0}, {}, "without joints"),
         ({"joints": lambda joints: joints[:10], "njoints": 10}, {}, "other joints"),
         ({"status": 77}, {}, "status 77 is unknown"),
-        ({"speed": float("nan")}, {}, "not finite"),
-        ({"ess": float("inf")}, {}, "not finite"),
+        ({"speed": float("nan")}, {}, "speed_m_s is nan"),
+        ({"ess": float("inf")}, {}, "ess is inf"),
         ({}, {"width": 0, "height": 0}, "0x0 pixels are not a picture"),
         ({}, {"width": -160}, "-160x120 pixels are not a picture"),
         ({}, {"height": -1}, "160x-1 pixels are not a picture"),

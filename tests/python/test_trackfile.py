@@ -230,9 +230,7 @@ def test_a_negative_sd_is_named(tmp_path):
         lines[2] = ",".join(cells)
 
     spoil(tmp_path / "t.csv", negate)
-    with pytest.raises(
-        UserError, match=r"t.csv: line 3: l_knee_sy is -0.25; a standard deviation is 0 or more"
-    ):
+    with pytest.raises(UserError, match=r"t.csv: line 3: l_knee_sy is '-0.25'; give 0 or more"):
         read_track(tmp_path / "t.csv")
 
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from gait.errors import UserError, unreadable
 from gait.io.files import require_file
 
-_LAST_FRAME = 2**53  # floating-point numbers cannot represent all larger integers
+LAST_FRAME = 2**53
+"""Largest number of a frame: floating-point numbers cannot represent all larger integers."""
 
 
 class Fields:
@@ -186,13 +187,13 @@ def frame_numbers(path: str | os.PathLike[str], column: NDArray[np.float64]) -> 
 
     UserError, with the first bad line, unless they are whole numbers that increase.
     """
-    wrong = (column != column.round()) | (np.abs(column) > _LAST_FRAME)
+    wrong = (column != column.round()) | (np.abs(column) > LAST_FRAME)
     wrong[1:] |= np.diff(column) <= 0
     if wrong.any():
         i = int(np.argmax(wrong))
         raise UserError(
             f"{path}: line {i + 2}: frame is {column[i]:g}; it must be whole numbers that increase, at most "
-            f"{_LAST_FRAME}"
+            f"{LAST_FRAME}"
         )
     return column.astype(np.int64)
 

@@ -45,6 +45,67 @@ WHOLE_COLUMNS = ("frame", *CLIP_COLUMNS[1:], PERSON_COLUMN)
 CAMERA_COLUMNS = tuple(f"camera_{k}_{what}" for k in range(1, 5) for what in ("x", "y", "heading"))
 
 
+#: Columns that may have any finite number, such as times since 1970; others are at most `LARGEST`.
+_UNBOUNDED = ("frame", "time", "log_evidence", *CLIP_COLUMNS, PERSON_COLUMN)
+LARGEST = 1e6
+"""Largest magnitude of other numbers in a track, in metres or another unit."""
+_NOT_NEGATIVE = re.compile(r"stature_m|ess|.*_sd(_rad|_m)?|.*_s[xyz]")
+
+
+def fault_in(column: str, values: npt.ArrayLike) -> tuple[int, str] | None:
+    """Return the index of the first value that a column of a track cannot have, and the remedy; None if none.
+
+    `values`: of shape (n,).
+    """
+    numbers = np.asarray(values, float)
+    most = np.inf if column in _UNBOUNDED else LARGEST
+    negative = (numbers < 0) & (_NOT_NEGATIVE.fullmatch(column) is not None)
+    for wrong, remedy in (
+        (~np.isfinite(numbers), "give a finite number"),
+        (np.abs(numbers) > most, f"give a number of at most {most:g}"),
+        (negative, "give 0 or more"),
+    ):
+        if wrong.any():
+            return int(wrong.argmax()), remedy
+    return None
+
+
+def fault_of(estimate: Estimate) -> str | None:
+    """Describe the first number of an estimate that a track or a page cannot have; None if there is none."""
+    mean, sd = estimate.mean, estimate.sd
+    columns: dict[str, npt.ArrayLike] = {
+        "heading_rad": [mean.heading],
+        "heading_sd_rad": [sd.heading],
+        "stature_m": [mean.stature],
+        "stature_sd_m": [sd.stature],
+        "speed_m_s": [estimate.speed],
+        "ess": [estimate.ess],
+        "log_evidence": [estimate.log_evidence],
+        "c_1": mean.coef,
+        "c_1_sd": sd.coef,
+        "angle_deg": np.degrees(estimate.angles),
+        "joint_x": estimate.joints.ravel(),
+        "joint_sx": estimate.joint_sd.ravel(),
+        "pelvis_x": mean.pelvis,
+        "hypothesis_weight": [estimate.hypothesis_weight],
+        "class_probability": estimate.class_probability,
+    }
+    columns |= {name: [getattr(mean, name)] for name in ("phase", "stride_hz", "pitch", "roll")}
+    if estimate.takes_strides:
+        columns |= {"phase_sd": [sd.phase], "stride_hz_sd": [sd.stride_hz]}
+    for name, values in columns.items():
+        if (fault := fault_in(name, values)) is not None:
+            return f"{name} is {np.ravel(values)[fault[0]]:g}"
+    return None
+
+
+def require_joints(names: Sequence[str]) -> None:
+    """Raise UserError unless a model's joints include those of a track."""
+    missing = [name for name in JOINTS if name not in names]
+    if missing:
+        raise UserError(f"model: has no joint {' '.join(missing)}; learn it with the default skeleton")
+
+
 def header(components: int, angle_names: tuple[str, ...], classes: tuple[str, ...] = ()) -> list[str]:
     """List the columns of a track file; columns for classes of motion only if the model has several."""
     scores = [f"c_{k + 1}" for k in range(components)]
@@ -89,9 +150,7 @@ class TrackWriter:
         film: str | None = None,
     ) -> None:
         self.path = path
-        missing = [name for name in JOINTS if name not in joint_names]
-        if missing:
-            raise UserError(f"model: has no joint {' '.join(missing)}; learn it with the default skeleton")
+        require_joints(joint_names)
         self._order = [joint_names.index(name) for name in JOINTS]
         self._components = components
         self._classes = len(classes) if len(classes) > 1 else 0
@@ -271,7 +330,7 @@ def _track(table: _Table, status: list[str], phase: Array) -> Track:
         places={name: table.vectors(name, "xyz") for name in JOINTS},
         status=status,
         phase=phase,
-        sd={name: table.standard_deviations(name) for name in JOINTS},
+        sd={name: table.vectors(name, ("sx", "sy", "sz")) for name in JOINTS},
         numbers={name: table.numbers(name) for name in table.rows if _is_number(name)},
         motion_class=table.column(CLASS_COLUMN) if CLASS_COLUMN in table.rows else [],
         frames=_frames(table) if set(CLIP_COLUMNS) <= table.rows.keys() else None,
@@ -333,28 +392,20 @@ class _Table:
 
     def numbers(self, name: str) -> Array:
         cells = self.column(name)
-        values = np.empty(len(cells))
+        values, given = np.empty(len(cells)), np.zeros(len(cells), bool)
         for i, cell in enumerate(cells):
             if not cell and (name in STRIDE_COLUMNS or name.startswith(CLASS_PREFIX)):
                 values[i] = np.nan
                 continue
+            given[i] = True
             try:
                 values[i] = float(cell)
             except ValueError:
                 values[i] = np.nan
-            if not np.isfinite(values[i]):
-                raise UserError(f"{self.path}: line {i + 2}: {name} is {cell!r}; give a finite number")
+        if (fault := fault_in(name, values[given])) is not None:
+            i = int(np.flatnonzero(given)[fault[0]])
+            raise UserError(f"{self.path}: line {i + 2}: {name} is {cells[i]!r}; {fault[1]}")
         return values
-
-    def standard_deviations(self, joint: str) -> Array:
-        sd = self.vectors(joint, ("sx", "sy", "sz"))
-        if (sd < 0).any():
-            i, axis = np.argwhere(sd < 0)[0]
-            cell = f"{joint}_s{'xyz'[axis]} is {sd[i, axis]:g}"
-            raise UserError(
-                f"{self.path}: line {i + 2}: {cell}; a standard deviation is 0 or more, write the file again"
-            )
-        return sd
 
     def vectors(self, joint: str, axes: str | tuple[str, ...]) -> Array:
         return np.stack([self.numbers(f"{joint}_{axis}") for axis in axes], axis=1)

@@ -16,6 +16,8 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.state import POSE_SCALARS, State
 from gait.camera.camera import Camera
 from gait.errors import UserError
+from gait.io.fields import LAST_FRAME
+from gait.io.track_file import fault_of
 from gait.io.video import Image
 from gait.lcm.link import gaitmsg
 
@@ -41,20 +43,33 @@ def decode(kind: Any, data: bytes, channel: str) -> Any:
         raise UserError(f"{channel}: damaged gaitmsg.{kind.__name__} ({exc})") from None
 
 
-def estimate_after(data: bytes, channel: str, before: Any = None) -> Any:
-    """Decode an ``estimate_t`` of a stream; `before`: the stream's first estimate.
+def estimate_after(
+    data: bytes, channel: str, before: Any = None, classes: Any = None
+) -> tuple[Any, Estimate]:
+    """Decode an ``estimate_t`` of a stream, and read it.
+
+    `before`: the stream's first estimate; `classes`: a ``classes_t``, used if it is of the same frame.
 
     Raises
     ------
     UserError
-        If it is damaged, or has other joints, angles or components than `before`.
+        If it is damaged, has other joints, angles or components than `before`, or an unknown status, or
+        numbers that no track may have.
     """
     message = decode(gaitmsg.estimate_t, data, channel)
     if not message.joints:
         raise UserError(f"{channel}: an estimate without joints")
     if before is not None and _holds(message) != _holds(before):
         raise UserError(f"{channel}: an estimate with other joints than before")
-    return message
+    if not (-1 <= message.frame <= LAST_FRAME and 0 <= message.step <= LAST_FRAME):
+        raise UserError(f"{channel}: an estimate of frame {message.frame}, step {message.step}")
+    if not 0 <= message.mean.ncoef <= MAX_COMPONENTS:
+        raise UserError(f"{channel}: an estimate with {message.mean.ncoef} components")
+    fits = classes is not None and classes.utime == message.utime
+    estimate = estimate_of(message, classes if fits else None)
+    if (fault := fault_of(estimate)) is not None:
+        raise UserError(f"{channel}: an estimate that cannot be: {fault}")
+    return message, estimate
 
 
 def _holds(message: Any) -> tuple[list[str], list[str], int]:

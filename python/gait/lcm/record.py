@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from gait.bindings.estimate import Estimate
 from gait.errors import UserError
 from gait.io.files import replacing
-from gait.io.track_file import TrackWriter
+from gait.io.track_file import TrackWriter, require_joints
 from gait.io.video import Frame
 from gait.lcm.link import LogWriter, break_of, events_of, handle, is_log, listener, log_of, now, require_log
-from gait.lcm.messages import classes_message, estimate_after, estimate_of
+from gait.lcm.messages import classes_message, estimate_after
 from gait.progress import durations
 
 LISTENING = "listening"
@@ -118,8 +118,9 @@ class Recorder:
         self._lcm, self._live, self._url = listener(url), not is_log(url), url
         self._output, self._path, self._person = output, log, person
         self._channel = channel_of(person, channel)
-        self._waiting: list[tuple[Any, Any]] = []  # estimates and their classes
+        self._waiting: list[tuple[Any, Estimate]] = []
         self._classes: tuple[Any, bytes] | None = None  # the newest
+        self._names: tuple[str, ...] = ()  # of the classes
         self._writer: TrackWriter | None = None
         self._log: LogWriter | None = None
         self._origin = 0
@@ -179,7 +180,10 @@ class Recorder:
 
     def _on_classes(self, channel: str, data: bytes) -> None:
         try:
-            self._classes = classes_message(data, channel), data
+            classes = classes_message(data, channel)
+            if self._names and tuple(classes.name) != self._names:
+                raise UserError(f"{channel}: other classes of motion than before")
+            self._classes = classes, data
         except UserError as fault:
             self._skip(fault)
 
@@ -190,8 +194,11 @@ class Recorder:
 
     def _on_estimate(self, channel: str, data: bytes) -> None:
         arrived = now()
+        classes, encoded = self._classes or (None, b"")
         try:
-            message = estimate_after(data, channel, self.figures.last)
+            message, estimate = estimate_after(data, channel, self.figures.last, classes)
+            if self.figures.last is None:
+                require_joints(estimate.joint_names)
         except UserError as fault:
             self._skip(fault)
             return
@@ -201,15 +208,15 @@ class Recorder:
             self.stop = True
             return
         self.figures.add(message, arrived)
-        classes, encoded = self._classes or (None, b"")
-        if classes is not None and classes.utime != message.utime:
-            classes = None
+        fits = classes is not None and classes.utime == message.utime
+        if fits:
+            self._names = tuple(classes.name)
         if self._log is not None:
-            if classes is not None:
+            if fits:
                 self._log.write(arrived, self._classes_channel, encoded)
             self._log.write(arrived, channel, data)
         self._last = time.monotonic()
-        self._waiting.append((message, classes))
+        self._waiting.append((message, estimate))
         if self._writer is not None or len(self._waiting) == 2:
             self._flush()
 
@@ -250,10 +257,10 @@ class Recorder:
         """Write waiting rows; the first waits for the second, as both are needed for the time of frame 0."""
         if self._waiting and self._writer is None:
             self._open()
-        for message, classes in self._waiting:
+        for message, estimate in self._waiting:
             assert self._writer is not None
             seconds = (message.utime - self._origin) / 1e6
-            self._writer.write(Frame(_number(message), seconds, _NO_IMAGE), estimate_of(message, classes))
+            self._writer.write(Frame(_number(message), seconds, _NO_IMAGE), estimate)
         self._waiting.clear()
 
     def _open(self) -> None:
@@ -262,9 +269,8 @@ class Recorder:
         self._origin = first.utime - round(interval * _number(first))
         joints = tuple(joint.name for joint in first.joints)
         angles = tuple(angle.name for angle in first.angles)
-        classes = next((tuple(one.name) for _, one in self._waiting if one is not None), ())
         self._writer = self._stack.enter_context(
-            TrackWriter(self._output, first.mean.ncoef, joints, angles, classes, person=self._person)
+            TrackWriter(self._output, first.mean.ncoef, joints, angles, self._names, person=self._person)
         )
 
 
@@ -340,7 +346,8 @@ def read_run(path: str, person: int | None = None) -> Run:
     """
     require_log(path)
     messages: list[Any] = []
-    classes: dict[int, Any] = {}  # by capture time
+    estimates: list[Estimate] = []
+    classes: Any = None  # the newest classes, which come before their estimate
     remark, damage = None, None
     arrived: list[int] = []
     for event in events_of(path, whole=False):
@@ -348,10 +355,11 @@ def read_run(path: str, person: int | None = None) -> Run:
             continue
         try:
             if event.channel != channel_of(person):
-                one = classes_message(event.data, path)
-                classes[one.utime] = one
+                classes = classes_message(event.data, path)
                 continue
-            message = estimate_after(event.data, path, messages[0] if messages else None)
+            message, estimate = estimate_after(event.data, path, messages[0] if messages else None, classes)
+            if not messages:
+                require_joints(estimate.joint_names)
         except UserError as fault:
             damage = damage or f"a message is skipped: {fault}"
             continue
@@ -359,6 +367,7 @@ def read_run(path: str, person: int | None = None) -> Run:
             remark = f"another stream begins with frame {message.frame}; only the first is used"
             break
         messages.append(message)
+        estimates.append(estimate)
         arrived.append(event.timestamp)
     if not messages:
         why = damage or break_of(path) or "record while gait-trackd is tracking"
@@ -367,7 +376,7 @@ def read_run(path: str, person: int | None = None) -> Run:
     return Run(
         frame=np.array([m.frame for m in messages], np.int64),
         seconds=(utime - utime[0]) / 1e6,
-        estimates=[estimate_of(m, classes.get(m.utime)) for m in messages],
+        estimates=estimates,
         step_ms=np.array([m.step_us for m in messages]) / 1e3,
         latency_ms=(np.array(arrived, np.int64) - utime) / 1e3,
         dropped=messages[-1].dropped,

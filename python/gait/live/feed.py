@@ -17,13 +17,12 @@ import numpy as np
 
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
-from gait.bindings.state import POSE_SCALARS
 from gait.body.skeleton import BONES
 from gait.camera.camera import Camera
 from gait.errors import UsageError, UserError
 from gait.io.video import Image
 from gait.lcm.link import gaitmsg, handle, is_log, listener, now, waiting
-from gait.lcm.messages import camera_of, classes_message, decode, estimate_of, picture
+from gait.lcm.messages import camera_of, classes_message, decode, estimate_after, picture
 from gait.report.drawing import Overlay, class_words
 from gait.web.motion_data import curve, motion_data, rounded
 
@@ -31,7 +30,6 @@ _KEPT_FRAMES = 64  # most frames that wait for their estimate, and most bytes of
 _KEPT_BYTES = 100_000_000
 _RECENT = 9  # frames from which a camera's frame interval is computed
 _QUEUED = 8  # frames that wait in LCM
-_LARGEST_NUMBER = 1e6  # largest number that is drawn, in metres or another unit
 #: Longest time without a drawing [s], even if messages wait or a tracker does not answer.
 _LONGEST_PAUSE_S = 0.5
 _ANNOUNCED = 1.0  # seconds between reports that frames arrive
@@ -274,16 +272,11 @@ class Feed:
         self._persons[person].classes = classes_message(data, channel)
 
     def _on_estimate(self, person: int, channel: str, data: bytes) -> None:
-        message = decode(gaitmsg.estimate_t, data, channel)
-        classes = self._persons[person].classes
-        fits = classes is not None and classes.utime == message.utime
-        estimate = estimate_of(message, classes if fits else None)
+        message, estimate = estimate_after(data, channel, classes=self._persons[person].classes)
         if estimate.joint_names != self._model.joint_names:
             raise UserError(
                 f"{channel}: an estimate of other joints than the model's; give the model that is tracked"
             )
-        if not _plausible(estimate):
-            raise UserError(f"{channel}: an estimate with numbers that are not finite")
         self._origin = message.utime if self._origin is None else self._origin
         # The panel shows seconds since the first frame, not the time of day.
         estimate = replace(estimate, utime=message.utime - self._origin)
@@ -388,11 +381,3 @@ def health(message: Any, drops: Drops) -> dict[str, Any]:
         "particles": message.particles,
         "threads": message.threads,
     }
-
-
-def _plausible(estimate: Estimate) -> bool:
-    """Whether all numbers that are drawn are finite and not absurdly large."""
-    mean = [getattr(estimate.mean, name) for name in POSE_SCALARS]
-    numbers = np.concatenate([estimate.joints.ravel(), estimate.joint_sd.ravel(), estimate.mean.pelvis, mean])
-    shown = [estimate.speed, estimate.ess, estimate.hypothesis_weight, *estimate.angles]
-    return bool((np.abs([*numbers, *shown]) < _LARGEST_NUMBER).all())  # False for NaN
