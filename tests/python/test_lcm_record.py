@@ -339,6 +339,18 @@ def test_a_log_cut_in_its_first_message_is_called_damaged(tmp_path):
         assert "damaged or ends at byte 0" in done.stderr
 
 
+@pytest.mark.parametrize("program", ["record", "view"])
+def test_a_log_damaged_before_its_first_estimate_is_called_damaged(program, tmp_path):
+    image = [message for _, message in rig.frames(0, 2)]
+    path = rig.write_log(tmp_path / "in.log", [("GAIT_IMAGE_0", each) for each in image])
+    second = path.stat().st_size // 2
+    path.write_bytes(states_too_much(path.read_bytes(), second, -1))
+    output = {"record": ["-o", tmp_path / "a.csv"], "view": ["--save", tmp_path / "a.png"]}
+    done = rig.gait(program, "--url", f"file://{path}?speed=0", *output[program], "--quiet")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert f"in.log: the log is damaged or ends at byte {second}, messages before: 1" in done.stderr
+
+
 @pytest.mark.parametrize("option", ["--frames", "--until-idle", "--patience"])
 def test_ends_that_cannot_be_are_usage_errors(tmp_path, option):
     done = rig.gait("record", "-o", tmp_path / "t.csv", option, "-1")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.io.files import replacing, require_folder
-from gait.lcm.link import lcm_url
+from gait.lcm.link import lcm_url, silence
 from gait.progress import note
 from gait.signals import Interruptible
 
@@ -138,6 +138,6 @@ def _save(
         while not pictures and time.monotonic() < deadline and feed.handle(_TURN):
             pass
         if not pictures:
-            why = feed.damage or "is gait-trackd tracking on this URL?"
+            why = feed.damage or silence(url)
             raise UserError(f"received no estimate with its frame and camera; {why}")
         write_picture(path, pictures[0])

@@ -83,6 +83,13 @@ def break_of(path: str | os.PathLike[str]) -> str | None:
     return _scan(path)
 
 
+def silence(url: str) -> str:
+    """Explain, for a message, why nothing arrived from `url`: the log is damaged, or nobody publishes."""
+    path = log_of(url)[0]
+    fault = break_of(path) if is_log(url) else None
+    return f"{path}: {fault}; record it again" if fault else "is gait-trackd tracking on this URL?"
+
+
 def events_of(path: str | os.PathLike[str], whole: bool = True) -> Iterator[Any]:
     """Yield the events of a log; if it breaks off, those before, unless it has to be `whole`.
 

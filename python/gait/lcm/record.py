@@ -15,7 +15,18 @@ from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter, require_joints
 from gait.io.video import Frame
-from gait.lcm.link import LogWriter, break_of, events_of, handle, is_log, listener, log_of, now, require_log
+from gait.lcm.link import (
+    LogWriter,
+    break_of,
+    events_of,
+    handle,
+    is_log,
+    listener,
+    log_of,
+    now,
+    require_log,
+    silence,
+)
 from gait.lcm.messages import classes_message, estimate_after
 from gait.progress import durations
 
@@ -163,8 +174,7 @@ class Recorder:
             self._flush()
             if not self.figures.utime:
                 raise UserError(
-                    f"{self._channel}: no estimate was received; "
-                    f"{self.damage or 'is gait-trackd tracking on this URL?'}"
+                    f"{self._channel}: no estimate was received; {self.damage or silence(self._url)}"
                 )
         if self._two:
             raise UserError(
