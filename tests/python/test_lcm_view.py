@@ -325,7 +325,17 @@ def test_what_is_a_log_already_is_not_recorded(log, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "words", [["--port", "70000"], ["--port", "-1"], ["--patience", "nan"], ["--stream", "-1"]], ids=" ".join
+    "words",
+    [
+        ["--port", "70000"],
+        ["--port", "-1"],
+        ["--patience", "nan"],
+        ["--stream", "-1"],
+        ["--person", "0"],
+        ["--person", "9"],
+        ["--person", "one"],
+    ],
+    ids=" ".join,
 )
 def test_options_out_of_their_range_are_usage_errors(words):
     done = rig.gait("view", *words)

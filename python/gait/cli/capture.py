@@ -98,7 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--person",
-        type=values.whole(1, 8),
+        type=values.whole(*values.PERSON),
         metavar="N",
         help="with gait-trackd --people or --person: the person that --init describes, whose tracker answers",
     )

@@ -39,7 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--frames", type=values.whole(1), metavar="N", help="end after N estimates")
     add("--until-idle", type=values.seconds, metavar="S", help="end after S seconds without an estimate")
     add("--patience", type=values.seconds, metavar="S", help="fail if there is no estimate within S seconds")
-    add("--person", type=values.whole(1, 8), metavar="N", help="of several people, the one with this number")
+    add(
+        "--person",
+        type=values.whole(*values.PERSON),
+        metavar="N",
+        help="of several people, the one with this number",
+    )
     add("--lagged", action="store_true", help="record the lagged estimate of each frame (gait-trackd --lag)")
     add(
         "--log",

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--track", metavar="OUT.csv", help="with a log: the track, from gait record")
     add(
         "--person",
-        type=values.whole(1, 8),
+        type=values.whole(*values.PERSON),
         metavar="N",
         help="with a log: of several people, the one with this number",
     )

@@ -14,6 +14,7 @@ PARTICLES_RANGE = (16, 1 << 20)  # as in gait.h and gait-trackd, like the ranges
 THREADS = (1, 256)  # GAIT_POOL_MAX
 SEED_RANGE = (0, (1 << 64) - 1)
 STREAM = (0, 30)
+PERSON = (1, 8)
 LONGEST_OFFSET_S = 86400.0  # a day
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
 PAGES = (".html", ".htm")
@@ -35,6 +36,16 @@ def whole(low: int, high: int | None = None) -> Callable[[str], int]:
         return number
 
     return value
+
+
+def tracker(text: str) -> str:
+    """Parse the number of a person, or the URL on which a tracker publishes."""
+    if "://" in text:
+        return text
+    try:
+        return str(whole(*PERSON)(text))
+    except ArgumentTypeError as fault:
+        raise ArgumentTypeError(f"{fault}, or a URL") from None
 
 
 def between(low: float, high: float, unit: str) -> Callable[[str], float]:

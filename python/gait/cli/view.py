@@ -59,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--person",
+        type=values.tracker,
         action="append",
         metavar="N|URL",
         help="number of a person (gait-trackd --people), or URL on which a tracker publishes (its --out); "
