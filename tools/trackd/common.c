@@ -14,23 +14,68 @@
 #include <unistd.h>
 
 /* ---- messages and clocks ---- */
+/* Bytes of the visible character that begins here, in UTF-8; 0: it is a control character, or none. */
+static int visible(const char *text)
+{
+    const unsigned char *const c = (const unsigned char *)text;
+    int const bytes = c[0] < 0x80   ? 1
+                      : c[0] < 0xc2 ? 0
+                      : c[0] < 0xe0 ? 2
+                      : c[0] < 0xf0 ? 3
+                      : c[0] < 0xf5 ? 4
+                                    : 0;
+    for (int i = 1; i < bytes; i++)
+        if ((c[i] & 0xc0) != 0x80)
+            return 0;
+    bool const control = c[0] < ' ' || c[0] == 0x7f || (c[0] == 0xc2 && c[1] < 0xa0);
+    bool const wrong = (c[0] == 0xe0 && c[1] < 0xa0) || (c[0] == 0xed && c[1] >= 0xa0) ||
+                       (c[0] == 0xf0 && c[1] < 0x90) || (c[0] == 0xf4 && c[1] >= 0x90);
+    return control || wrong ? 0 : bytes;
+}
+
+/* Copy `text` with everything else as \xNN, as much of it as fits. */
+static void make_visible(char *out, size_t capacity, const char *text)
+{
+    size_t n = 0;
+    while (*text) {
+        int const bytes = visible(text);
+        if (n + (bytes ? (size_t)bytes : 4) >= capacity)
+            break;
+        if (bytes)
+            memcpy(out + n, text, (size_t)bytes);
+        else
+            snprintf(out + n, capacity - n, "\\x%02x", (unsigned char)*text);
+        n += bytes ? (size_t)bytes : 4;
+        text += bytes ? bytes : 1;
+    }
+    out[n] = '\0';
+}
+
+void message_format(message *m, const char *format, va_list args)
+{
+    message raw;
+    vsnprintf(raw.text, sizeof raw.text, format, args);
+    make_visible(m->text, sizeof m->text, raw.text);
+}
+
 bool message_set(message *m, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    vsnprintf(m->text, sizeof m->text, format, args);
+    message_format(m, format, args);
     va_end(args);
     return false;
 }
 
 void log_line(const char *format, ...)
 {
+    char raw[1024], line[sizeof raw];
     va_list args;
     va_start(args, format);
-    fputs("gait-trackd: ", stderr);
-    vfprintf(stderr, format, args);
-    fputc('\n', stderr);
+    vsnprintf(raw, sizeof raw, format, args);
     va_end(args);
+    make_visible(line, sizeof line, raw);
+    fprintf(stderr, "gait-trackd: %s\n", line);
 }
 
 void log_event(const char *format, ...)
@@ -53,7 +98,7 @@ void log_event(const char *format, ...)
     }
     lines++;
     va_start(args, format);
-    vsnprintf(line.text, sizeof line.text, format, args);
+    message_format(&line, format, args);
     va_end(args);
     log_line("%s", line.text);
 }

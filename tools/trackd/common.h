@@ -4,6 +4,7 @@
 #include "gait.h"
 #include "gait_pool.h"
 
+#include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -12,7 +13,10 @@ typedef struct message {
     char text[256];
 } message;
 
-/* Write the line; always returns false, so that a caller can end with `return message_set(...)`. */
+/* Write the line, with everything that text from outside could do to a terminal or a log made visible: control characters
+ * and bytes that are not UTF-8 become \xNN. */
+void message_format(message *m, const char *format, va_list args) __attribute__((format(printf, 2, 0)));
+/* The same; always returns false, so that a caller can end with `return message_set(...)`. */
 bool message_set(message *m, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* Print a line to stderr. */
 void log_line(const char *format, ...) __attribute__((format(printf, 1, 2)));

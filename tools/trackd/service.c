@@ -26,7 +26,7 @@ void service_complain(service *s, const char *format, ...)
     message line;
     va_list args;
     va_start(args, format);
-    vsnprintf(line.text, sizeof line.text, format, args);
+    message_format(&line, format, args);
     va_end(args);
     s->news = true;
     if (strcmp(s->complaint.text, line.text) != 0 &&
