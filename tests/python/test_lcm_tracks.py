@@ -96,6 +96,16 @@ def test_joints_are_those_of_their_frame_whichever_comes_first(tmp_path: Path) -
     assert before.digest == after.digest == mixed.digest
 
 
+def test_a_start_at_the_next_frame_is_not_spent_on_one_that_waits(tmp_path: Path) -> None:
+    """The frame before a pause waits for its keypoints until the next one arrives."""
+    camera, scene, _ = rig.opening()
+    late = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i + 100))) for i in range(1, 9)]
+    events = [camera, scene, image(0), ("GAIT_COMMAND", rig.start(1, at=0)), *late]
+    outcome = rig.play(rig.write_log(tmp_path / "a.log", events), "--keypoints-term")
+    assert [e.frame for e in outcome.estimates] == list(range(1, 9))
+    assert "stopped" not in outcome.words and outcome.dropped == 0
+
+
 def test_errors_that_a_detector_states_count_as_in_a_film(tmp_path: Path) -> None:
     events = []
     for i in range(FRAMES):

@@ -373,6 +373,7 @@ void service_background(service *s, const image_view *v)
 
 static void command_start(service *s, const gaitmsg_command_t *msg)
 {
+    const frame_hold *const hold = &s->shared->hold;
     gait_state mean, sd;
     message why;
     if (!clock_check(msg->utime, &why) ||
@@ -380,7 +381,7 @@ static void command_start(service *s, const gaitmsg_command_t *msg)
         !convert_state_message(&msg->sd, &s->track.prior_sd, &sd, &why)) {
         service_complain(s, "%s", why.text);
     } else if (start_usable(s, &mean, &sd)) {
-        start_trigger_by_time(&s->start, &mean, &sd, msg->utime);
+        start_trigger_by_time(&s->start, &mean, &sd, msg->utime, hold->bytes ? hold->utime : -1);
         s->seek = !s->has_init;
         set_idle(s);
     }

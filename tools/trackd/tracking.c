@@ -11,10 +11,16 @@ void start_trigger_by_file(start_trigger *a, const init_state *init)
         .armed = true, .mean = init->mean, .sd = init->sd, .frame = init->frame, .last_frame = -1};
 }
 
-void start_trigger_by_time(start_trigger *a, const gait_state *mean, const gait_state *sd, int64_t utime)
+void start_trigger_by_time(start_trigger *a, const gait_state *mean, const gait_state *sd, int64_t utime,
+                           int64_t before)
 {
-    *a = (start_trigger){
-        .armed = true, .mean = *mean, .sd = *sd, .frame = -1, .utime = utime, .last_frame = -1};
+    *a = (start_trigger){.armed = true,
+                         .mean = *mean,
+                         .sd = *sd,
+                         .frame = -1,
+                         .utime = utime,
+                         .before = before,
+                         .last_frame = -1};
 }
 
 /* The frame of the start was lost: interpolate its capture time between its neighbours. */
@@ -54,7 +60,7 @@ start_trigger_answer start_trigger_reached(start_trigger *a, const image_view *f
     *utime = a->utime ? a->utime : frame->utime;
     if (a->frame >= 0)
         answer = by_number(a, frame, utime, why);
-    else if (frame->utime < a->utime)
+    else if (a->utime ? frame->utime < a->utime : frame->utime == a->before)
         answer = START_TRIGGER_WAIT;
     double const late = (double)(frame->utime - *utime) * 1e-6;
     if (answer == START_TRIGGER_START && late > max_gap) {

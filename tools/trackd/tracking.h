@@ -10,8 +10,9 @@
 typedef struct start_trigger {
     bool armed;
     gait_state mean, sd;
-    int64_t frame;                  /* start at the frame of this number; -1: by time */
-    int64_t utime;                  /* start at this capture time; 0: at the next frame */
+    int64_t frame;  /* start at the frame of this number; -1: by time */
+    int64_t utime;  /* start at this capture time; 0: at the next frame, */
+    int64_t before; /* which is not that of this time: it waits since before the command; -1: none does */
     int64_t last_frame, last_utime; /* of the frame before; -1: none yet */
     int64_t received;               /* frames, for sources that do not number them */
 } start_trigger;
@@ -23,7 +24,9 @@ typedef enum start_trigger_answer {
 } start_trigger_answer;
 
 void start_trigger_by_file(start_trigger *a, const init_state *init);
-void start_trigger_by_time(start_trigger *a, const gait_state *mean, const gait_state *sd, int64_t utime);
+/* `before`: capture time of the frame that waits, see above. */
+void start_trigger_by_time(start_trigger *a, const gait_state *mean, const gait_state *sd, int64_t utime,
+                           int64_t before);
 /* Whether the stream has reached the start; `utime` is then the capture time of the start.  START_TRIGGER_MISSED: the stream
  * began more than `max_gap` seconds too late. */
 start_trigger_answer start_trigger_reached(start_trigger *a, const image_view *frame, double max_gap,
