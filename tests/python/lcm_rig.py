@@ -348,3 +348,8 @@ def without_network(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [*unshare, *words], capture_output=True, text=True, timeout=2 * PATIENCE, check=False
     )
+
+
+def written(path: Path) -> int:
+    """Bytes of an unfinished recording."""
+    return sum(part.stat().st_size for part in path.parent.glob(f".{path.stem}.*"))

@@ -28,7 +28,6 @@ from gait.lcm.messages import camera_message, estimate_of
 from gait.live import feed as feeds
 from gait.live import server
 from gait.live.feed import Drops, Feed
-from gait.live.recording import Recording
 from gait.live.server import Page
 from gait.report.drawing import Overlay
 from gait.web import serve
@@ -295,33 +294,13 @@ def test_a_recording_holds_what_the_url_carries(page, tmp_path):
     sender, frames = rig.Listener(page._url), rig.frames(0, 3)
     path, deadline = Path(begun["path"]), time.monotonic() + rig.PATIENCE
     sender.send(frames)
-    while path.stat().st_size == 0 and time.monotonic() < deadline:
+    while not rig.written(path) and time.monotonic() < deadline:
         sender.listen(50)
+    assert not path.exists()
     assert press(0, **own) == begun | {"fault": None} and press(0, **own) == {}
     recorded = list(lcm.EventLog(str(path), "r"))
     assert recorded and {e.channel for e in recorded} == {"GAIT_IMAGE_0"}
     assert recorded[0].data in [message.encode() for _, message in frames]
-
-
-def test_a_recording_has_a_log_for_each_persons_tracker(tmp_path):
-    rig.need_multicast()
-    urls = [private_url() for _ in range(3)]
-    recording = Recording(urls[0], urls[1:], tmp_path, lambda: None)
-    senders, deadline = [rig.Listener(url) for url in urls], time.monotonic() + rig.PATIENCE
-    while any(path.stat().st_size == 0 for path in recording.paths) and time.monotonic() < deadline:
-        for k, sender in enumerate(senders):
-            sender.send(rig.frames(k, k + 1))
-            sender.listen(20)
-    recording.end()
-    assert [path.stem.partition("-person-")[2] for path in recording.paths] == ["", "1", "2"]
-    for k, path in enumerate(recording.paths):
-        wanted = rig.frames(k, k + 1)[0][1].encode()
-        assert {event.data for event in lcm.EventLog(str(path), "r")} == {wanted}
-
-
-def test_what_is_a_log_already_is_not_recorded(log, tmp_path):
-    with pytest.raises(UserError, match="copy the file"):
-        Recording(f"file://{log}?speed=0", [], tmp_path, lambda: None)
 
 
 @pytest.mark.parametrize(

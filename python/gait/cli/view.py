@@ -107,7 +107,7 @@ def _serve(
         feed = Feed(
             url, streams, model, cameras, page.show, page.report, args.scale_camera, page.watched, people
         )
-        page.begin(feed.page_data)
+        page.begin(feed.page_data, feed.scene)
         with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # this is how the user ends it
             print(page.address, flush=True)
             while feed.handle(_TURN):

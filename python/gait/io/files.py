@@ -40,7 +40,7 @@ def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | No
     """
     require_writable(path)
     target = Path(os.path.realpath(path))
-    _recover(target)
+    recover(target.parent, re.escape(target.stem), target.suffix)
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(8)}{target.suffix}")
     descriptor = -1
     try:
@@ -102,14 +102,18 @@ def require_unlocked(path: str | os.PathLike[str]) -> None:
             lock(file.fileno(), path, fcntl.LOCK_SH)  # does not disturb others that only look
 
 
-def _recover(target: Path) -> None:
-    """Rename our files left by killed writers of `target`, and report them; remove those without contents."""
-    pattern = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{16}}{re.escape(target.suffix)}")
+def recover(folder: Path, stem: str, suffix: str) -> None:
+    """Rename our files left by killed writers, and report them; remove those without contents.
+
+    `stem`: pattern of the names of outputs without their suffix.
+    """
+    pattern = re.compile(rf"\.({stem})\.[0-9a-f]{{16}}{re.escape(suffix)}")
     try:
-        names = [name for name in os.listdir(target.parent) if pattern.fullmatch(name)]
+        names = [name for name in os.listdir(folder) if pattern.fullmatch(name)]
     except OSError:  # a folder that may be written, but not listed
         return
-    for left in filter(_is_left, map(target.with_name, names)):
+    for left in filter(_is_left, map(folder.joinpath, names)):
+        target = folder / f"{pattern.fullmatch(left.name)[1]}{suffix}"  # type: ignore[index]
         with suppress(OSError):  # another command was faster
             if left.stat().st_size == 0 or (target.suffix == ".csv" and not end_at_a_row(left)):
                 left.unlink()

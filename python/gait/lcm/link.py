@@ -84,7 +84,7 @@ def break_of(path: str | os.PathLike[str]) -> str | None:
 
 
 def silence(url: str) -> str:
-    """Explain, for a message, why nothing arrived from `url`: the log is damaged, or nobody publishes."""
+    """Explain, for a message, why nothing arrived from `url`: the log is damaged, or no tracker publishes."""
     path = log_of(url)[0]
     fault = break_of(path) if is_log(url) else None
     return f"{path}: {fault}; record it again" if fault else "is gait-trackd tracking on this URL?"
@@ -118,6 +118,24 @@ def _scan(path: str | os.PathLike[str]) -> str | None:
     UserError if liblcm would take more memory than the file has: it searches for the first event, and
     allocates what an event states.  gait-trackd has the same rule (lcm_link.c): neither can call the other.
     """
+    size, (at, events, stated) = Path(path).stat().st_size, _whole_events(path)
+    if at == size:
+        return None
+    fault = f"the log is damaged or ends at byte {at}, messages before: {events}"
+    if events == 0 or stated > size:
+        raise UserError(f"{path}: {fault}; record it again")
+    return fault
+
+
+def end_at_an_event(path: Path) -> bool:
+    """Cut off an incomplete last event of a log; return whether it has any others."""
+    at, events, _ = _whole_events(path)
+    os.truncate(path, at)
+    return events > 0
+
+
+def _whole_events(path: str | os.PathLike[str]) -> tuple[int, int, int]:
+    """Return the byte at which a log's whole events end, their number, and the length of the last event."""
     size, at, events, stated = Path(path).stat().st_size, 0, 0, 0
     with open(path, "rb") as file:
         while at < size:
@@ -132,12 +150,7 @@ def _scan(path: str | os.PathLike[str]) -> str | None:
                 break
             at, events = at + stated, events + 1
             file.seek(at)
-    if at == size:
-        return None
-    fault = f"the log is damaged or ends at byte {at}, messages before: {events}"
-    if events == 0 or stated > size:
-        raise UserError(f"{path}: {fault}; record it again")
-    return fault
+    return at, events, stated
 
 
 class LogWriter:
@@ -164,7 +177,7 @@ class LogWriter:
         try:
             self._file = BufferedWriter(FileIO(path, mode))
         except OSError as error:
-            raise self._fault(error) from None
+            raise self._fault(error) from error
         if mode == "a":
             with ExitStack() as refused:
                 refused.callback(self._file.close)
@@ -178,7 +191,7 @@ class LogWriter:
             self._file.write(_EVENT_HEADER.pack(_SYNC, self._events, utime, len(name), len(data)) + name)
             self._file.write(data)
         except OSError as error:
-            raise self._fault(error) from None
+            raise self._fault(error) from error
         self._events += 1
 
     def publish(self, channel: str, data: bytes) -> None:
@@ -192,7 +205,7 @@ class LogWriter:
                 self._file.flush()
                 flush(self._file.fileno())
         except OSError as error:
-            raise self._fault(error) from None
+            raise self._fault(error) from error
 
     def _fault(self, error: OSError) -> UserError:
         return UserError(f"{self._name}: the log cannot be written: {error.strerror}")

@@ -18,6 +18,7 @@ from gait.io.video import Frame
 from gait.lcm.link import (
     LogWriter,
     break_of,
+    end_at_an_event,
     events_of,
     handle,
     is_log,
@@ -162,7 +163,7 @@ class Recorder:
         begun = time.monotonic()
         with ExitStack() as self._stack:
             if self._path is not None:
-                temporary = self._stack.enter_context(replacing(self._path))
+                temporary = self._stack.enter_context(replacing(self._path, end_at_an_event))
                 self._log = self._stack.enter_context(closing(LogWriter(temporary, name=self._path)))
             ended = False
             while not self.stop and not (ended := not handle(self._lcm, _TURN, not self._live)):
@@ -218,11 +219,12 @@ class Recorder:
             self.stop = True
             return
         self.figures.add(message, arrived)
-        fits = classes is not None and classes.utime == message.utime
-        if fits:
+        if classes is not None and classes.utime != message.utime:
+            classes = None
+        if classes is not None:
             self._names = tuple(classes.name)
         if self._log is not None:
-            if fits:
+            if classes is not None:
                 self._log.write(arrived, self._classes_channel, encoded)
             self._log.write(arrived, channel, data)
         self._last = time.monotonic()

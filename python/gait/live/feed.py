@@ -158,6 +158,8 @@ class Feed:
     ----------
     damage : str or None
         Describes the fault of the first message that could not be shown.
+    scene : dict of str to bytes
+        The newest message of each camera and background on `url`, by channel.
     """
 
     def __init__(
@@ -184,6 +186,8 @@ class Feed:
         self._answers: dict[int, dict[int, tuple[Estimate, int]]] = {}  # by capture time and person
         self._drawn, self._announced = 0.0, -np.inf
         self.damage: str | None = None
+        self.scene: dict[str, bytes] = {}
+        self._subscribe(url, "GAIT_(CAMERA|BACKGROUND)_[0-9]+", self.scene.__setitem__, _QUEUED)
         for stream, camera in cameras.items():
             self._views[stream].use(camera, model)
         for stream in streams:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 from gait.errors import UserError
-from gait.lcm.link import LogWriter, is_log, now, open_lcm, waiting
+from gait.io.files import recover, replacing
+from gait.lcm.link import LogWriter, end_at_an_event, is_log, now, open_lcm, waiting
+from gait.progress import note
 
 _TURN = 0.1  # seconds between polls
 _WAITING = 1000  # messages that may wait
@@ -27,9 +31,13 @@ class Recording:
         URLs on which trackers publish, one for each person; `url` itself has only one log.
     folder : path
         Folder for ``gait-DATE-TIME.log`` and, for each further URL, ``gait-DATE-TIME-person-2.log``; existing
-        files are not changed.
+        files are not changed.  They get their names when they are complete; if one cannot be written, all
+        are named ``gait-DATE-TIME.unfinished.log``, and so on.
     failed : callable
         Called in the recording's thread when a log cannot be written; all logs have then ended.
+    scene : mapping of str to bytes
+        Encoded messages by channel with which the log of `url` begins: its cameras and backgrounds, without
+        which it could not be tracked.
 
     Attributes
     ----------
@@ -40,11 +48,16 @@ class Recording:
     Raises
     ------
     UserError
-        If a file cannot be created, or the URL is already a log.
+        If a file cannot be written, or the URL is already a log.
     """
 
     def __init__(
-        self, url: str, people: Sequence[str], folder: str | Path, failed: Callable[[], None]
+        self,
+        url: str,
+        people: Sequence[str],
+        folder: str | Path,
+        failed: Callable[[], None],
+        scene: Mapping[str, bytes] = MappingProxyType({}),
     ) -> None:
         if is_log(url):
             raise UserError(f"{url}: is already a log; copy the file")
@@ -52,42 +65,50 @@ class Recording:
         self.paths = _unused(Path(folder), ["", *further.values()])
         self.fault: str | None = None
         self._failed = failed
-        self._links, self._logs = [], [LogWriter(path, "w") for path in self.paths]
-        for name, log in zip([url, *further], self._logs, strict=True):
-            self._links.append(open_lcm(name))
-            self._links[-1].subscribe(".*", partial(self._write, log)).set_queue_capacity(_WAITING)
+        self._links = []
+        with ExitStack() as stack:
+            for name, path in zip([url, *further], self.paths, strict=True):
+                temporary = stack.enter_context(replacing(path, end_at_an_event))
+                log = stack.enter_context(closing(LogWriter(temporary, name=str(path))))
+                if name == url:
+                    for channel, data in dict(scene).items():
+                        log.write(now(), channel, data)
+                self._links.append(open_lcm(name))
+                self._links[-1].subscribe(".*", partial(_write, log)).set_queue_capacity(_WAITING)
+            self._logs = stack.pop_all()
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
-        while not self._end.is_set() and self.fault is None:
-            for link in waiting(self._links, _TURN):
-                link.handle()
-        if self.fault is not None:
-            self._failed()
-
-    def _write(self, log: LogWriter, channel: str, data: bytes) -> None:
-        if channel == _OWN:
-            return
         try:
-            log.write(now(), channel, data)
+            with self._logs:
+                while not self._end.is_set():
+                    for link in waiting(self._links, _TURN):
+                        link.handle()
         except UserError as error:
             self.fault = str(error)
+            note(f"gait view: the recording has ended: {error}")
+            self._failed()
 
     def end(self) -> None:
-        """Write waiting messages, and close the logs."""
+        """Complete the logs."""
         self._end.set()
         self._thread.join()
-        for log in self._logs:
-            try:
-                log.close()
-            except UserError as error:
-                self.fault = self.fault or str(error)
+
+
+def _write(log: LogWriter, channel: str, data: bytes) -> None:
+    if channel != _OWN:
+        log.write(now(), channel, data)
+
+
+def recover_recordings(folder: str | Path) -> None:
+    """Rename logs left by killed commands to ``gait-DATE-TIME.unfinished.log``, and report them."""
+    recover(Path(folder), r"gait-\d{8}-\d{6}(-\d+)?(-person-\d+)?", ".log")
 
 
 def _unused(folder: Path, endings: Sequence[str]) -> list[Path]:
-    """Create empty files with unused names, one for each ending."""
+    """Return names of no files, one for each ending."""
     stem = time.strftime("gait-%Y%m%d-%H%M%S")
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -95,12 +116,6 @@ def _unused(folder: Path, endings: Sequence[str]) -> list[Path]:
         raise UserError(f"{folder}: cannot be made: {error.strerror}") from None
     for k in range(100):
         paths = [folder / f"{stem}{f'-{k}' if k else ''}{ending}.log" for ending in endings]
-        try:
-            for path in paths:
-                path.open("xb").close()
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise UserError(f"{path}: cannot be created: {error.strerror}") from None
-        return paths
+        if not any(path.exists() or list(folder.glob(f".{path.stem}.*")) for path in paths):
+            return paths
     raise UserError(f"{folder}: has logs of every possible name for this second")

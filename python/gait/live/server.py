@@ -9,7 +9,7 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from gait.errors import UserError
 from gait.io.video import Image
-from gait.live.recording import Recording
+from gait.live.recording import Recording, recover_recordings
 from gait.web import modules, serve
 
 _HERE = Path(__file__).parent
@@ -197,6 +197,7 @@ class Page:
         self._people = tuple(people) or (url,)
         self.hub = Hub()
         self._data: Callable[[], dict[str, Any]] = dict
+        self._scene: Mapping[str, bytes] = {}
         self._recording: Recording | None = None
         self._topics = [f"{topic} {k}" for topic in ("sample", "health") for k in range(len(self._people))]
         self._topics += ["recording", "frames", *map(_picture, streams)]
@@ -204,13 +205,14 @@ class Page:
         self._pictures: dict[int, Image] = {}
         self._jpeg: dict[int, tuple[int, bytes]] = {}
         self._open, self._pace, self._shown = 0, Pace(), 0.0
+        recover_recordings(folder)
         own = serve.listen(port)
         self.address = serve.address(own)
         self._server, self._thread = serve.background(self._application(own.getsockname()[1]), own)
 
-    def begin(self, data: Callable[[], dict[str, Any]]) -> None:
-        """Set the initial data of the figure and the plots."""
-        self._data = data
+    def begin(self, data: Callable[[], dict[str, Any]], scene: Mapping[str, bytes]) -> None:
+        """Set the initial data of the figure and the plots, and the messages with which recordings begin."""
+        self._data, self._scene = data, scene
 
     def show(self, stream: int, image: Image) -> None:
         """Make a picture the newest of its camera; browsers are notified, and request it."""
@@ -262,7 +264,9 @@ class Page:
         ended = self._recording
         if on and ended is None:
             try:
-                self._recording = Recording(self._url, self._people, self._folder, self._report_recording)
+                self._recording = Recording(
+                    self._url, self._people, self._folder, self._report_recording, self._scene
+                )
             except UserError as error:
                 return JSONResponse({"error": str(error)}, 409)
         elif not on and ended is not None:

@@ -1,0 +1,90 @@
+"""Logs recorded by the live page: complete or marked as unfinished, and beginning with the camera."""
+
+import errno
+import os
+import threading
+import time
+from io import FileIO
+
+import lcm
+import lcm_rig as rig
+import pytest
+
+from gait.errors import UserError
+from gait.lcm import link
+from gait.lcm.link import events_of, private_url
+from gait.live.feed import Feed
+from gait.live.recording import Recording
+from gait.live.server import Page
+
+
+def test_a_recording_has_a_log_for_each_persons_tracker(tmp_path):
+    rig.need_multicast()
+    urls = [private_url() for _ in range(3)]
+    recording = Recording(urls[0], urls[1:], tmp_path, lambda: None)
+    senders, deadline = [rig.Listener(url) for url in urls], time.monotonic() + rig.PATIENCE
+    while not all(map(rig.written, recording.paths)) and time.monotonic() < deadline:
+        for k, sender in enumerate(senders):
+            sender.send(rig.frames(k, k + 1))
+            sender.listen(20)
+    recording.end()
+    assert [path.stem.partition("-person-")[2] for path in recording.paths] == ["", "1", "2"]
+    for k, path in enumerate(recording.paths):
+        wanted = rig.frames(k, k + 1)[0][1].encode()
+        assert {event.data for event in lcm.EventLog(str(path), "r")} == {wanted}
+
+
+def test_a_recording_begins_with_camera_and_background(tmp_path):
+    """They may have come long before."""
+    opening = [*rig.opening(), ("GAIT_BACKGROUND_0", rig.frames(0, 1)[0][1]), *rig.frames(0, 1)]
+    url = f"file://{rig.write_log(tmp_path / 'in.log', opening)}?speed=0"
+    feed = Feed(url, [0], rig.model(), {}, lambda *_: None)
+    while feed.handle(1.0):
+        pass
+    scene = feed.scene
+    assert set(scene) == {"GAIT_CAMERA_0", "GAIT_BACKGROUND_0"}
+    rig.need_multicast()
+    recording = Recording(private_url(), [], tmp_path, lambda: None, scene)
+    recording.end()
+    assert {event.channel: event.data for event in events_of(recording.paths[0])} == scene
+
+
+def test_a_recording_for_which_there_is_no_space_is_marked(tmp_path, monkeypatch, capfd):
+    """Whole messages are kept; stderr has the reason."""
+    rig.need_multicast()
+    full, real = threading.Event(), FileIO.write
+
+    def write(self, data):
+        if full.is_set():
+            real(self, bytes(data)[:100])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return real(self, data)
+
+    monkeypatch.setattr(link, "FileIO", type("Disk", (FileIO,), {"write": write}))
+    ended = threading.Event()
+    url = private_url()
+    recording, sender = Recording(url, [], tmp_path, ended.set), rig.Listener(url)
+    deadline = time.monotonic() + rig.PATIENCE
+    while not ended.is_set() and time.monotonic() < deadline:
+        sender.send(rig.frames(0, 1))
+        sender.listen(20)
+        if rig.written(recording.paths[0]):
+            full.set()
+    recording.end()
+    kept = recording.paths[0].with_suffix(".unfinished.log")
+    assert "No space left on device" in recording.fault and list(tmp_path.iterdir()) == [kept]
+    assert {event.channel for event in events_of(kept)} == {"GAIT_IMAGE_0"}
+    assert f"gait view: the recording has ended: {recording.paths[0]}" in capfd.readouterr().err
+
+
+def test_a_killed_recording_is_marked_when_the_page_is_opened_again(tmp_path, capfd):
+    left = tmp_path / ".gait-20260102-030405-person-2.0123456789abcdef.log"
+    left.write_bytes(rig.write_log(tmp_path / "in.log", rig.frames(0, 1)).read_bytes())
+    Page(0, [0], private_url(), tmp_path).close()
+    assert {p.name for p in tmp_path.iterdir()} == {"in.log", "gait-20260102-030405-person-2.unfinished.log"}
+    assert "was killed; what it wrote is in" in capfd.readouterr().err
+
+
+def test_what_is_a_log_already_is_not_recorded(tmp_path):
+    with pytest.raises(UserError, match="copy the file"):
+        Recording(f"file://{tmp_path}/in.log", [], tmp_path, lambda: None)
