@@ -1,5 +1,6 @@
 """Logs that gait-trackd reads and writes: none is destroyed, and every loss is noticed."""
 
+import itertools
 import json
 import resource
 import subprocess
@@ -81,21 +82,22 @@ def test_a_log_has_one_writer(tmp_path, mode):
     """Until it ends, also if it is killed."""
     rig.need_multicast()
     source, out = log(tmp_path), tmp_path / "out.log"
+    written = out if mode == "a" else tmp_path / "out.unfinished.log"
     (tmp_path / "link.log").symlink_to(out)
     words = rig.command("--url", private_url(), "--out", f"file://{out}?mode={mode}")
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as first:
         try:
             assert first.stderr and "listening" in first.stderr.readline()
-            number = out.stat().st_ino
-            for name in ("out.log", "link.log"):
-                done = run(source, f"file://{tmp_path / name}?mode={mode}")
+            number = written.stat().st_ino
+            for name, other in itertools.product(("out.log", "link.log"), "wa"):
+                done = run(source, f"file://{tmp_path / name}?mode={other}")
                 one_line(done, 1, f"{name}: another program is writing this log; give another name")
-            with (
-                pytest.raises(UserError, match="another program is writing this file; give another name"),
-                publisher(f"file://{out}?mode={mode}"),
-            ):
-                pass
-            assert out.stat().st_ino == number
+                with (
+                    pytest.raises(UserError, match="another program is writing this file; give another name"),
+                    publisher(f"file://{tmp_path / name}?mode={other}"),
+                ):
+                    pass
+            assert written.stat().st_ino == number and (mode == "a" or not out.exists())
         finally:
             first.kill()
     assert run(source, f"file://{out}?mode={mode}").returncode == 0
@@ -118,13 +120,14 @@ def test_a_log_that_may_not_grow_is_noticed(tmp_path):
     def small():
         resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
 
-    done = run(log(tmp_path, 12), f"file://{tmp_path}/out.log?mode=w", preexec_fn=small)
-    one_line(done, 1, "cannot be written: File too large")
+    old = log(tmp_path, name="out.log")
+    before = old.read_bytes()
+    done = run(log(tmp_path, 12), f"file://{old}?mode=w", preexec_fn=small)
+    one_line(done, 1, "cannot be written: File too large; what was written is in out.unfinished.log")
+    assert old.read_bytes() == before and (tmp_path / "out.unfinished.log").stat().st_size == 8192
 
 
 def test_a_log_of_which_nothing_could_be_written_is_removed(tmp_path):
-    """Also one that replaced another, which is lost as soon as it is opened."""
-
     def none():
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 
@@ -143,8 +146,26 @@ def test_a_log_that_breaks_off_is_reported_and_tracked_as_far_as_it_goes(tmp_pat
     whole = source.read_bytes()
     source.write_bytes(whole[:-1000])
     done = run(source, f"file://{tmp_path}/out.log?mode=w")
-    one_line(done, 1, "truncated at byte", "after 5 messages")
-    assert "frames 2 " in done.stdout
+    one_line(done, 1, "truncated at byte", "after 5 messages; what was written is in out.unfinished.log")
+    assert "frames 2 " in done.stdout and not (tmp_path / "out.log").exists()
+    written = rig.read_log(tmp_path / "out.unfinished.log", "GAIT_ESTIMATE", gaitmsg.estimate_t)
+    assert [message.frame for message in written] == [0, 1]
+
+
+def test_a_log_replaces_what_its_name_stands_for_only_when_it_is_complete(tmp_path):
+    """The file that a chain of links points to, there or not, with its mode."""
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (tmp_path / "second").symlink_to("folder/out")
+    (folder / "first").symlink_to(tmp_path / "second")
+    for mode in (0o600, 0o640):
+        assert run(log(tmp_path), f"file://{folder / 'first'}?mode=w").returncode == 0
+        assert len(rig.read_log(folder / "out", "GAIT_ESTIMATE", gaitmsg.estimate_t)) == 3
+        assert {path.name for path in folder.iterdir()} == {"first", "out"} and (
+            folder / "first"
+        ).is_symlink()
+        assert mode == 0o600 or (folder / "out").stat().st_mode & 0o777 == 0o600
+        (folder / "out").chmod(mode)
 
 
 @pytest.mark.parametrize(("content", "words"), [(b"", "is empty"), (b"x" * 100, "damaged or truncated")])

@@ -191,38 +191,68 @@ static void test_lost_messages(void)
     sink_publish(&s, "A", 0, data, 9);
     sink_publish(&s, "A", 0, data, 9);
     CHECK(s.failed == 2 && !sink_ended(&s, &why)); /* later ones may go out */
-    CHECK(!sink_close(&s, &why) &&
+    CHECK(!sink_close(&s, true, &why) &&
           strcmp(why.text, "--out: messages were lost: LCM could not send them") == 0);
     CHECK(layer.destroyed == 1 && !s.lcm);
     layer.publish = 0;
-    CHECK(sink_open(&s, "udpm://239.1.1.1:7667", &why) && sink_close(&s, &why) && layer.destroyed == 2);
+    CHECK(sink_open(&s, "udpm://239.1.1.1:7667", &why) && sink_close(&s, true, &why) && layer.destroyed == 2);
+}
+
+static void test_names_beside(void)
+{
+    static const char *const names[][2] = {{"/a.b/c", "/a.b/c.unfinished"},
+                                           {"/a/b.log", "/a/b.unfinished.log"},
+                                           {"b.c.log", "b.c.unfinished.log"},
+                                           {"a/.log", "a/.log.unfinished"}};
+    char beside[LINK_PATH];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        name_beside(names[i][0], beside);
+        CHECK(strcmp(beside, names[i][1]) == 0);
+    }
 }
 
 static void test_log(void)
 {
-    char name[] = P_tmpdir "/gait_link_XXXXXX", url[64];
+    char name[] = P_tmpdir "/gait_link_XXXXXX", url[64], beside[64];
     sink s = {0};
     close(mkstemp(name));
     snprintf(url, sizeof url, "file://%s?mode=w", name);
     layer = (struct layer){0};
     CHECK(!sink_open(&s, "file:///absent/log?mode=w", &why) && strstr(why.text, "No such file"));
-    CHECK(sink_close(&s, &why)); /* no output */
+    CHECK(sink_close(&s, true, &why)); /* no output */
     CHECK(sink_open(&s, url, &why));
     sink_publish(&s, "A", 0, data, 9);
     CHECK(!sink_ended(&s, &why));
     sink another;
     CHECK(!sink_open(&another, url, &why) && strstr(why.text, "another program is writing this log"));
-    CHECK(sink_close(&s, &why) && log_scan(name, &why) == 1);
+    CHECK(sink_close(&s, true, &why) && log_scan(name, &why) == 1);
     static const struct {
         int fault;
         bool fine;
     } fsyncs[] = {{EINVAL, true}, {EROFS, true}, {EIO, false}};
+    snprintf(beside, sizeof beside, "%s.unfinished", name);
     for (size_t i = 0; i < sizeof fsyncs / sizeof *fsyncs; i++) {
         layer.fsync = fsyncs[i].fault;
-        CHECK(sink_open(&s, url, &why));
-        CHECK(sink_close(&s, &why) == fsyncs[i].fine && (fsyncs[i].fine || strstr(why.text, strerror(EIO))));
+        CHECK(sink_open(&s, url, &why) && access(beside, F_OK) == 0);
+        CHECK(!sink_check(url, &(sink){0}, &why) && strstr(why.text, "another program"));
+        CHECK(sink_check(url, &s, &why));
+        sink_publish(&s, "A", 0, data, 9);
+        CHECK(sink_close(&s, true, &why) == fsyncs[i].fine &&
+              (fsyncs[i].fine || strstr(why.text, strerror(EIO))));
+        CHECK((access(beside, F_OK) == 0) == !fsyncs[i].fine && log_scan(name, &why) == 1);
     }
+    layer.fsync = 0;
+    CHECK(sink_open(&s, url, &why));
+    sink_publish(&s, "A", 0, data, 9);
+    sink_publish(&s, "A", 0, data, 9);
+    message_set(&why, "the program failed");
+    CHECK(!sink_close(&s, false, &why) &&
+          strstr(why.text, "the program failed; what was written is in gait_link"));
+    CHECK(log_scan(name, &why) == 1 && log_scan(beside, &why) == 2);
+    CHECK(sink_check(url, &s, &why) && access(beside, F_OK) == 0);
+    unlink(beside);
     unlink(name);
+    CHECK(sink_check(url, &s, &why) && access(name, F_OK) != 0 && access(beside, F_OK) != 0);
 }
 
 /* A full disk is noticed when a buffer is written, or at the end; after it nothing more is written. */
@@ -232,7 +262,7 @@ static void test_full_disk(void)
     layer = (struct layer){0};
     CHECK(sink_open(&s, "file:///dev/full?mode=w", &why));
     sink_publish(&s, "A", 0, data, 9); /* is buffered */
-    CHECK(!sink_ended(&s, &why) && !sink_close(&s, &why) && strstr(why.text, strerror(ENOSPC)));
+    CHECK(!sink_ended(&s, &why) && !sink_close(&s, true, &why) && strstr(why.text, strerror(ENOSPC)));
     CHECK(sink_open(&s, "file:///dev/full?mode=w", &why));
     for (int i = 0; i < 3; i++)
         sink_publish(&s, "A", 0, data, sizeof data);
@@ -240,12 +270,12 @@ static void test_full_disk(void)
     int64_t const failed = s.failed;
     sink_publish(&s, "A", 0, data, 9);
     CHECK(s.failed == failed + 1);
-    CHECK(!sink_close(&s, &why) && strstr(why.text, "the log cannot be written: "));
+    CHECK(!sink_close(&s, true, &why) && strstr(why.text, "the log cannot be written: "));
     CHECK(sink_open(&s, "file:///dev/full?mode=w", &why));
     sink_publish(&s, "A", 0, data, 9);
     CHECK(fflush(s.log->f) != 0);
     sink_publish(&s, "A", 0, data, 9); /* is buffered, but those before it are lost */
-    CHECK(sink_ended(&s, &why) && !sink_close(&s, &why));
+    CHECK(sink_ended(&s, &why) && !sink_close(&s, true, &why));
 }
 
 int main(void)
@@ -256,6 +286,7 @@ int main(void)
     test_muted();
     test_subscribe();
     test_lost_messages();
+    test_names_beside();
     test_log();
     test_full_disk();
     return CHECK_DONE();

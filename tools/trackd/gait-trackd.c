@@ -269,16 +269,14 @@ static bool open_instance(instance *n, message *why)
     return workers_start(&n->threads, want->threads, why) && snapshot_file_check(&n->snapshot, why) &&
            load(s, want, &n->extra, &n->threads, &n->out, why) &&
            receiver_open(&n->receiver, s, &n->snapshot, url, why) &&
-           (!to || n->trial || sink_open(&n->out, to, why)); /* last, as it empties a log */
+           (!to || n->trial || sink_open(&n->out, to, why)); /* last: it makes a file */
 }
 
 /* Close it; `ok` as it was, or false if messages were lost. */
 static bool close_instance(instance *n, bool ok, message *why)
 {
-    message lost;
     receiver_close(&n->receiver);
-    if (!sink_close(&n->out, &lost) && ok)
-        ok = message_set(why, "%s", lost.text);
+    ok = sink_close(&n->out, ok, why);
     workers_stop(&n->threads);
     for (service *each = n->service.next; each; each = each->next)
         service_close(each);

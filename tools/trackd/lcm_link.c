@@ -197,60 +197,123 @@ const char *link_channel(const char *channel, int person, char name[LINK_CHANNEL
 /* ---- output ---- */
 #define TAKEN "--out %.160s: another program is writing this log; give another name"
 
-/* Lock a log before it is emptied; a kill releases the lock.  Only files are locked; what else cannot be opened is reported
- * when the log is. */
-static bool lock(sink *s, const char *path, message *why)
+/* Where a log is: what a chain of links points to, whether it is there or not. */
+static void follow(const char *path, char to[LINK_PATH])
+{
+    enum { LINKS = 40 };
+    char link[LINK_PATH], from[LINK_PATH];
+    ssize_t n;
+    snprintf(to, LINK_PATH, "%s", path);
+    for (int i = 0; i < LINKS && (n = readlink(to, link, sizeof link - 1)) > 0; i++) {
+        link[n] = '\0';
+        memcpy(from, to, sizeof from);
+        const char *const slash = strrchr(from, '/');
+        int const folder = link[0] != '/' && slash ? (int)(slash - from + 1) : 0;
+        snprintf(to, LINK_PATH, "%.*s%.*s", folder, from, LINK_PATH - 1 - folder, link);
+    }
+}
+
+/* NAME.unfinished.SUFFIX, as the commands call their files. */
+static void name_beside(const char *path, char beside[LINK_PATH])
+{
+    const char *const slash = strrchr(path, '/'), *const name = slash ? slash + 1 : path;
+    const char *const dot = strrchr(name, '.'), *const suffix = dot && dot > name ? dot : name + strlen(name);
+    enum { ADDED = sizeof ".unfinished" };
+    int const stem = suffix - path < LINK_PATH - ADDED ? (int)(suffix - path) : LINK_PATH - ADDED;
+    snprintf(beside, LINK_PATH, "%.*s.unfinished%.*s", stem, path, LINK_PATH - ADDED - stem, suffix);
+}
+
+/* Set the names of the log of this URL, and return its mode. */
+static char set_names(sink *s, const char *url, char path[LINK_PATH])
 {
     struct stat is;
-    s->lock = open(path, O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
-    if (s->lock < 0 || fstat(s->lock, &is) != 0 || !S_ISREG(is.st_mode) ||
-        flock(s->lock, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)
-        return true;
-    close(s->lock);
-    return message_set(why, TAKEN, path);
+    char const mode = link_log(url, path);
+    follow(path, s->path);
+    name_beside(s->path, s->beside);
+    s->fresh = mode == 'w' && (stat(s->path, &is) != 0 || S_ISREG(is.st_mode)); /* not a device or a pipe */
+    return mode;
+}
+
+/* Open a log and lock it, before it is emptied; a kill releases the lock.  -1: it cannot be opened.  Only files are locked. */
+static int lock(const char *path, int flags, bool *taken)
+{
+    struct stat is;
+    int const file = open(path, O_WRONLY | O_CLOEXEC | O_NONBLOCK | flags, 0666);
+    if (file < 0 || fstat(file, &is) != 0 || !S_ISREG(is.st_mode) || flock(file, LOCK_EX | LOCK_NB) == 0 ||
+        errno != EWOULDBLOCK)
+        return file;
+    close(file);
+    *taken = true;
+    return -1;
+}
+
+static void unlock(const sink *s)
+{
+    if (s->lock >= 0)
+        close(s->lock);
+    if (s->other >= 0)
+        close(s->other);
+}
+
+/* Lock both names; `flags` are for that which is written.  Returns 0, an errno of that, or -1: another program writes. */
+static int lock_both(sink *s, int flags)
+{
+    bool taken = false;
+    s->other = lock(s->fresh ? s->path : s->beside, 0, &taken);
+    s->lock = taken ? -1 : lock(s->fresh ? s->beside : s->path, flags, &taken);
+    int const fault = s->lock < 0 ? errno : 0;
+    if (taken)
+        unlock(s);
+    return taken ? -1 : fault;
+}
+
+/* A new log has the mode of the file that it will replace. */
+static void keep_mode(const sink *s)
+{
+    struct stat old;
+    if (s->fresh && s->other >= 0 && fstat(s->other, &old) == 0 && fchmod(s->lock, old.st_mode & 0777) != 0)
+        log_line("--out %.160s: keeps no permissions: %s", s->path, strerror(errno));
 }
 
 bool sink_open(sink *s, const char *url, message *why)
 {
     char path[LINK_PATH];
-    char const mode[2] = {link_log(url, path)};
     *s = (sink){0};
     if (!link_is_log(url))
         return (s->lcm = link_open(url, why)) != NULL;
-    if (!lock(s, path, why))
-        return false;
-    s->log = lcm_eventlog_create(path, mode);
-    snprintf(s->path, sizeof s->path, "%s", path);
-    s->emptied = mode[0] == 'w';
+    char const mode[2] = {set_names(s, url, path)};
+    if (lock_both(s, O_CREAT) == -1)
+        return message_set(why, TAKEN, path);
+    keep_mode(s);
+    s->log = lcm_eventlog_create(s->fresh ? s->beside : s->path, mode); /* reports what could not be opened */
     if (s->log)
         return true;
     message_set(why, "%.160s: this log cannot be written: %s", path, strerror(errno));
-    if (s->lock >= 0)
-        close(s->lock);
+    unlock(s);
     return false;
 }
 
 bool sink_check(const char *url, const sink *own, message *why)
 {
     char path[LINK_PATH];
-    (void)link_log(url, path);
+    sink s = {0};
     if (!link_is_log(url)) {
         lcm_t *const lcm = link_open(url, why);
         if (lcm)
             lcm_destroy(lcm);
         return lcm != NULL;
     }
-    int const file = open(path, O_WRONLY | O_CLOEXEC | O_NONBLOCK); /* ENXIO: a pipe that no one reads yet */
-    int fault = file >= 0 || errno == ENXIO ? 0 : errno;
-    if (fault == ENOENT)
-        fault = folder_fault(path);
-    bool const taken = file >= 0 && strcmp(path, own->path) != 0 && flock(file, LOCK_EX | LOCK_NB) != 0 &&
-                       errno == EWOULDBLOCK;
-    if (file >= 0)
-        close(file);
-    if (taken)
+    (void)set_names(&s, url, path);
+    if (own->log && strcmp(s.path, own->path) == 0)
+        return true;
+    int fault = lock_both(&s, 0);
+    if (fault == -1)
         return message_set(why, TAKEN, path);
-    return !fault || message_set(why, "%.160s: this log cannot be written: %s", path, strerror(fault));
+    unlock(&s);
+    if (fault == ENOENT)
+        fault = folder_fault(s.path);
+    return !fault || fault == ENXIO || /* a pipe that no one reads yet */
+           message_set(why, "%.160s: this log cannot be written: %s", path, strerror(fault));
 }
 
 static void lost(sink *s, const char *what)
@@ -292,38 +355,47 @@ bool sink_ended(const sink *s, message *why)
            !message_set(why, "--out: the log cannot be written: %.180s", s->fault.text);
 }
 
-/* Write all that is buffered to the disk, and the log's name; devices and pipes, and their folders, may have none. */
-static bool flush(const sink *s)
+/* Write all that is buffered to the disk, give a new log its name, and write that; devices and pipes, and their folders, may
+ * have none. */
+static bool finish(const sink *s, bool ok)
 {
     FILE *const f = s->log->f;
     if (fflush(f) != 0 || (fsync(fileno(f)) != 0 && errno != EINVAL && errno != EROFS))
+        return false;
+    if (ok && s->fresh && rename(s->beside, s->path) != 0)
         return false;
     errno = folder_flush(s->path);
     return errno == 0 || errno == EROFS;
 }
 
-/* Remove a new log for which there was no space at all. */
-static void remove_empty(const sink *s)
+/* A new log without its name: remove it if there is nothing in it. */
+static void leave(const sink *s, message *why)
 {
     struct stat is;
-    if (s->failed && s->emptied && fstat(s->lock, &is) == 0 && S_ISREG(is.st_mode) && is.st_size == 0)
-        unlink(s->path);
+    const char *const slash = strrchr(s->beside, '/');
+    message const reason = *why;
+    if (stat(s->beside, &is) != 0)
+        return;
+    if (is.st_size == 0)
+        unlink(s->beside);
+    else
+        message_set(why, "%.150s; what was written is in %.80s", reason.text, slash ? slash + 1 : s->beside);
 }
 
-bool sink_close(sink *s, message *why)
+bool sink_close(sink *s, bool ok, message *why)
 {
     if (s->lcm)
         lcm_destroy(s->lcm);
-    if (s->log && !flush(s) && !s->failed)
+    if (s->log && !finish(s, ok && !s->failed) && !s->failed)
         lost(s, strerror(errno));
-    bool const ok = s->failed == 0 ||
-                    message_set(why, "--out: %s %.180s",
-                                s->log ? "the log cannot be written:" : "messages were lost:", s->fault.text);
-    if (s->log)
+    if (ok && s->failed)
+        ok = message_set(why, "--out: %s %.180s",
+                         s->log ? "the log cannot be written:" : "messages were lost:", s->fault.text);
+    if (s->log) {
         lcm_eventlog_destroy(s->log);
-    if (s->log && s->lock >= 0) {
-        remove_empty(s);
-        close(s->lock);
+        if (!ok && s->fresh)
+            leave(s, why);
+        unlock(s);
     }
     *s = (sink){0};
     return ok;

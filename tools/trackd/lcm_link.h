@@ -32,14 +32,15 @@ bool link_is_log(const char *url);
 char link_log(const char *url, char path[LINK_PATH]);
 
 /* ---- output to LCM, or to a log with checked writes (LCM's own log provider does not report failures). */
-typedef struct sink {     /* all zero: no output */
-    lcm_t *lcm;           /* or NULL */
-    lcm_eventlog_t *log;  /* or NULL */
-    int lock;             /* with a log: descriptor that locks it, or -1 */
-    char path[LINK_PATH]; /* of the log */
-    bool emptied;         /* it is a new one, or was emptied */
-    int64_t failed;       /* messages that did not go out */
-    message fault;        /* of the first of them */
+typedef struct sink {       /* all zero: no output */
+    lcm_t *lcm;             /* or NULL */
+    lcm_eventlog_t *log;    /* or NULL */
+    int lock, other;        /* with a log: descriptors that lock what is written and its other name, or -1 */
+    char path[LINK_PATH];   /* of the log, not of a link to it */
+    char beside[LINK_PATH]; /* NAME.unfinished.SUFFIX, to which a new log is written until it is complete */
+    bool fresh;             /* it is a new log */
+    int64_t failed;         /* messages that did not go out */
+    message fault;          /* of the first of them */
 } sink;
 
 /* Open `url`; a log has ?mode=w (new) or a (append), and no other writer. */
@@ -51,6 +52,7 @@ bool sink_check(const char *url, const sink *own, message *why);
 void sink_publish(sink *s, const char *channel, int person, const uint8_t *bytes, int size);
 /* Whether writing the log has failed, so that the program should end. */
 bool sink_ended(const sink *s, message *why);
-/* Flush and close; false if anything was lost. */
-bool sink_close(sink *s, message *why);
+/* Flush and close.  If the program has not failed (`ok`) and nothing was lost, a new log gets its name; otherwise the result is
+ * false, and `why` also tells where what was written is. */
+bool sink_close(sink *s, bool ok, message *why);
 #endif

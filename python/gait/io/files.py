@@ -96,10 +96,15 @@ def lock(descriptor: int, path: str | os.PathLike[str], kind: int = fcntl.LOCK_E
 
 
 def require_unlocked(path: str | os.PathLike[str]) -> None:
-    """Raise UserError if another program is writing an existing file in place, as gait-trackd writes logs."""
-    if Path(path).is_file():
-        with open(path, "rb") as file:
-            lock(file.fileno(), path, fcntl.LOCK_SH)  # does not disturb others that only look
+    """Raise UserError if another program writes this file as gait-trackd does.
+
+    That appends in place, and writes new logs as NAME.unfinished.SUFFIX.
+    """
+    target = Path(os.path.realpath(path))
+    for name in (target, target.with_name(f"{target.stem}.unfinished{target.suffix}")):
+        if name.is_file():
+            with open(name, "rb") as file:
+                lock(file.fileno(), path, fcntl.LOCK_SH)  # does not disturb others that only look
 
 
 def recover(folder: Path, stem: str, suffix: str) -> None:

@@ -172,7 +172,7 @@ class LogWriter:
 
     def __init__(self, path: str | os.PathLike[str], mode: str = "w", name: str | None = None) -> None:
         self._name, self._events = name or path, 0
-        if mode == "w" and name is not None:
+        if name is not None:
             require_unlocked(name)
         try:
             self._file = BufferedWriter(FileIO(path, mode))
