@@ -5,6 +5,7 @@ import signal
 import subprocess
 import time
 
+import av
 import lcm_rig as rig
 import pytest
 
@@ -68,6 +69,24 @@ def test_a_log_can_be_added_to(folder, tmp_path):
     for mode in "wa":
         assert capture(folder, f"file://{log}?speed=0&mode={mode}").returncode == 0
     assert len(rig.read_log(log, "GAIT_IMAGE_0", gaitmsg.image_t)) == 2 * COUNT
+
+
+def test_a_damaged_film_is_reported(folder, tmp_path):
+    """Its frames are sent nevertheless, as the decoder guesses what they showed."""
+    video = folder / "video.mp4"
+    whole = video.read_bytes()
+    with av.open(str(video)) as container:
+        packets = [packet for packet in container.demux(video=0) if packet.size]
+    spoilt = bytearray(whole)
+    for packet in packets[3:6]:
+        middle = packet.pos + packet.size // 2
+        spoilt[middle : middle + 4] = bytes(255 - byte for byte in whole[middle : middle + 4])
+    (tmp_path / "video.mp4").write_bytes(spoilt)
+    words = ["--url", f"file://{tmp_path}/out.log?mode=w", "--camera", folder / "camera.json"]
+    done = rig.gait("capture", tmp_path / "video.mp4", *words, "--background", "none", "--rate", "max")
+    assert done.returncode == 0 and f"warning: {tmp_path}/video.mp4: frames are damaged: " in done.stderr
+    done = rig.gait("capture", video, *words, "--background", "none", "--rate", "max")
+    assert done.returncode == 0 and "damaged" not in done.stderr
 
 
 def test_films_that_begin_at_one_time_have_the_same_stamps(folder, tmp_path):

@@ -34,7 +34,7 @@ from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.io.files import require_unread
 from gait.lcm.link import buffer_warning, is_log, lcm_url, log_of, publisher
-from gait.progress import note, progress
+from gait.progress import note, progress, warning
 from gait.signals import Interruptible
 
 if TYPE_CHECKING:
@@ -114,13 +114,13 @@ def run(args: argparse.Namespace) -> int:
     with Interruptible() as signals:
         source = _source(args)
         setup = _setup(args, source)
-        warning = buffer_warning(url)
-        if warning:
-            note(f"gait capture: {warning}", args.quiet)
+        few = buffer_warning(url)
+        if few:
+            note(f"gait capture: {few}", args.quiet)
         with publisher(url) as out:
             sender = Publisher(out, setup)
             pacer = _send(args, source, sender, rate, signals)
-    _report(args, sender, pacer)
+    _report(args, source, sender, pacer)
     return 0
 
 
@@ -269,7 +269,13 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
     )
 
 
-def _report(args: argparse.Namespace, publisher: Publisher, pacer: Pacer) -> None:
+def _report(
+    args: argparse.Namespace, source: FileSource | DeviceSource, publisher: Publisher, pacer: Pacer
+) -> None:
+    from gait.lcm.capture import DeviceSource
+
+    broken = None if isinstance(source, DeviceSource) else source.video.broken
+    warning(broken or "", args.quiet or not broken)
     late = round(pacer.late * 1000, 2)
     if args.json:
         print(json.dumps({"frames": publisher.sent, "late_ms": late}))

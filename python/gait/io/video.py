@@ -85,7 +85,8 @@ class Video:
     times : ndarray of shape (count,)
         Presentation times, seconds since the first frame, from the file's index.
     broken : str or None
-        A description, if the file ends before the last of the frames that it states.
+        A description, if the file ends before the last of the frames that it states, or a decoded frame was
+        damaged.
     digest : str
         Hash of the sizes of the coded pictures: the same for copies in other containers, but not for other
         films.
@@ -100,6 +101,7 @@ class Video:
         import av
 
         self.path = Path(path)
+        self._damaged: set[int] = set()  # frames, of those decoded so far
         require_file(self.path, "video file")
         try:
             self._probe()
@@ -162,7 +164,7 @@ class Video:
             stated, more = stream.frames, 0
             if not stated and container.duration and len(container.streams) == 1:  # sound may be longer
                 stated, more = round(container.duration * 1e-6 * self.fps), _END
-            self.broken = None
+            self.broken: str | None = None
             if len(packets) + more < stated:
                 found = f"breaks off after frame {self.count} of {stated}"
                 self.broken = f"{self.path}: {found}; copy it again if you need the rest"
@@ -189,9 +191,17 @@ class Video:
                     if last is not None and time <= last:
                         time = last + 1 / self.fps
                     last = time
+                    if frame.is_corrupt:
+                        self._note_damage(index)
                     yield index, time, frame
         except av.error.FFmpegError as exc:
             raise self._unreadable(exc) from exc
+
+    def _note_damage(self, index: int) -> None:
+        """Add a damaged frame to `broken`, once however often it is decoded."""
+        self._damaged.add(index)
+        found = f"frames are damaged: {len(self._damaged)}, first {min(self._damaged)}"
+        self.broken = f"{self.path}: {found}; copy it again if you need them"
 
     def _upright(self, frame: av.VideoFrame) -> Image:
         """Return a frame's pixels, rotated and mirrored as the container states."""
