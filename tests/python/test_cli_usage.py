@@ -147,8 +147,10 @@ def test_an_error_without_a_text_still_states_the_remedy(monkeypatch, capsys):
     assert capsys.readouterr().err == "gait info: not enough memory: close other programs or give less\n"
 
 
-def test_a_full_standard_output_is_named():
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_standard_output_is_named(unbuffered):
+    """The error comes at the end, or where a command prints."""
+    environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
     with open("/dev/full", "w") as full:
         done = subprocess.run(
             [sys.executable, "-m", "gait", "info", "walk"],

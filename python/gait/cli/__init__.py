@@ -111,7 +111,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except MemoryError as exc:
         return _failed(command, f"not enough memory: {str(exc) or 'close other programs or give less'}")
     except OSError as exc:
-        return _failed(command, f"{exc.filename or _unnamed()}: {exc.strerror or exc}")
+        return _failed(command, f"{exc.filename or _unnamed(exc)}: {exc.strerror or exc}")
     except KeyboardInterrupt:
         return _failed(command, "interrupted")
 
@@ -128,14 +128,19 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
     return args
 
 
-def _unnamed() -> str:
-    """Name what an OSError without a file name is about: the standard output if it cannot be written."""
+def _unnamed(error: OSError) -> str:
+    """Name what an OSError without a file name is about: the standard output if it cannot be written.
+
+    Errors of writing other files have their names.
+    """
+    from gait.io.files import WRITE_ERRORS
+
     try:
         sys.stdout.flush()
     except OSError:
         _silence()
         return "standard output"
-    return "file"
+    return "standard output" if error.errno in WRITE_ERRORS else "file"
 
 
 def _silence() -> None:
