@@ -125,9 +125,25 @@ def test_no_multicast_route_and_a_small_buffer(monkeypatch, tmp_path):
     )
 
 
+class Deaf:
+    """A network on which nothing arrives."""
+
+    subscribe = publish = staticmethod(lambda *_: None)
+    handle_timeout = staticmethod(lambda _: 0)
+
+
 @pytest.mark.parametrize(
     ("url", "words"),
-    [("bogus://x", "fault lcm url: LCM_DEFAULT_URL: bogus://x"), ("memq://", "ok    lcm url: "), (None, "")],
+    [
+        ("bogus://x", "fault lcm url: LCM_DEFAULT_URL: bogus://x"),
+        ("file:///none/a.log", "fault lcm url: LCM_DEFAULT_URL: /none/a.log: no such LCM log; "),
+        ("file:///none/a.log?mode=w", "fault lcm url: LCM_DEFAULT_URL: /none/a.log: folder /none does not "),
+        ("udpm://239.255.76.67:7667?ttl=5", "note  lcm url: "),
+        ("udpm://239.255.76.67:7667?recv_buf_size=4194304&ttl=1", "note  lcm url: "),
+        ("udpm://239.255.76.67:7667?ttl=0", "ok    lcm url: "),
+        ("memq://", "ok    lcm url: "),
+        (None, ""),
+    ],
 )
 def test_the_network_of_the_environment_is_checked(url, words, monkeypatch):
     pytest.importorskip("lcm", reason="lcm is not installed: extra lcm")
@@ -135,6 +151,8 @@ def test_the_network_of_the_environment_is_checked(url, words, monkeypatch):
         monkeypatch.delenv("LCM_DEFAULT_URL", raising=False)
     else:
         monkeypatch.setenv("LCM_DEFAULT_URL", url)
+    if url is not None and url.startswith("udpm"):
+        monkeypatch.setattr("gait.lcm.link.open_lcm", lambda url: Deaf)
     found = [line for line in lines(doctor.check_network) if "lcm url" in line]
     assert len(found) == (url is not None) and all(line.startswith(words) for line in found)
     assert "fault" not in words or "; " in found[0]
@@ -150,11 +168,6 @@ def test_a_log_of_the_environment_is_left_alone(monkeypatch, tmp_path):
 
 def test_a_message_that_is_lost(monkeypatch):
     link = pytest.importorskip("gait.lcm.link", reason="lcm is not installed: extra lcm")
-
-    class Deaf:
-        subscribe = publish = staticmethod(lambda *_: None)
-        handle_timeout = staticmethod(lambda _: 0)
-
     monkeypatch.setattr(link, "open_lcm", lambda url: Deaf)
     assert lines(doctor.check_network)[0].startswith("fault lcm route: a multicast message does not return")
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -154,16 +155,27 @@ def check_network() -> Iterator[Finding]:
 
 
 def _given_network(link: Any, url: str) -> Finding:
-    """Check that the network of ``LCM_DEFAULT_URL`` can be opened; a log is left alone."""
+    """Check that the network or the log of ``LCM_DEFAULT_URL`` can be opened, without changing the log."""
     from gait.errors import UserError
+    from gait.io.files import require_writable
 
     try:
+        path, mode = link.log_of(url)
         if not link.is_log(url):
             link.open_lcm(url)
+        elif mode == "r":
+            link.require_log(path)
+        else:
+            require_writable(path)
     except UserError as error:
         text, _, remedy = str(error).rpartition("; ")
         return Finding("lcm url", "fault", f"LCM_DEFAULT_URL: {text}", f"{remedy}, or unset LCM_DEFAULT_URL")
-    return Finding("lcm url", "ok", f"LCM_DEFAULT_URL is {url}")
+    text = f"LCM_DEFAULT_URL is {url}"
+    hops = [int(each) for each in re.findall(r"[?&]ttl=0*([0-9]+)", url)]
+    if url.startswith(link.MULTICAST) and hops and hops[-1] > 0:
+        reach = "messages leave this machine, unencrypted; with ttl=0 they stay"
+        return Finding("lcm url", "note", text, reach)
+    return Finding("lcm url", "ok", text)
 
 
 def _comes_back(link: Any) -> bool:
