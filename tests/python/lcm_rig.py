@@ -199,6 +199,8 @@ def play(log: Path, *options: object) -> Outcome:
     out = log.with_suffix(".out")
     out.unlink(missing_ok=True)
     outcome = run(*command("--url", f"file://{log}?speed=0", "--out", f"file://{out}?mode=w", *options)[1:])
+    if outcome.code != 0:
+        out = log.with_suffix(".unfinished.out")
     outcome.estimates = read_log(out, "GAIT_ESTIMATE", gaitmsg.estimate_t)
     came = outcome.estimates or read_log(out, "GAIT_LIFT", gaitmsg.estimate_t)
     assert outcome.code == (0 if came else 1), outcome.words

@@ -53,6 +53,6 @@ void sink_publish(sink *s, const char *channel, int person, const uint8_t *bytes
 /* Whether writing the log has failed, so that the program should end. */
 bool sink_ended(const sink *s, message *why);
 /* Flush and close.  If the program has not failed (`ok`) and nothing was lost, a new log gets its name; otherwise the result is
- * false, and `why` also tells where what was written is. */
+ * false, and `why` also names the file with what was written. */
 bool sink_close(sink *s, bool ok, message *why);
 #endif
