@@ -159,13 +159,13 @@ def test_after_a_kill_two_streams_are_tracked_as_if_nothing_had_happened(tmp_pat
         backgrounds = [event for event in opening() if "BACKGROUND" in event[0]]
         listener.ask(backgrounds, lambda s: s.background_mask == BOTH, "backgrounds")
         last = feed(listener, killed, FRAMES)
-        assert f"following the person of frame {killed - 1}" in finish().words
+        assert f"the person of frame {killed - 1}, captured" in finish().words
     state = (tmp_path / "state").read_bytes()
     assert f"{last.tracker_digest % 2**64:016x}" == by_python(set(range(FRAMES)))
     with rig.daemon(url, *words) as (listener, finish):
         other = camera_message(replace(SIDE, fx=SIDE.fx + 5), 1)
         listener.ask([("GAIT_CAMERA_3", other)], lambda s: s.state != s.RUNNING, "the other camera")
-        assert "following the person" in finish().words
+        assert "is followed if" in finish().words
     (tmp_path / "state").write_bytes(state)
     with rig.daemon(url, *words, "--further-streams", 4) as (_, finish):
         assert "is not used: for --further-streams 3" in finish().words

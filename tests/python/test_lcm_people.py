@@ -180,7 +180,7 @@ def test_after_a_kill_everyone_is_followed_by_number_as_if_nothing_had_happened(
             listener.ask(scene[1:], lambda s: s.background_mask, "the background")
             last[kill] = followed(listener, killed, end)
             printed = finish().words
-            assert all(f"following person {k} of frame {killed - 1}" in printed for k in (1, 2))
+            assert all(f"person {k} of frame {killed - 1}, captured" in printed for k in (1, 2))
         words[2] = 1
         with rig.daemon(url, *words) as (_, finish):
             assert "person 2 is not used: --people is less" in finish().words

@@ -57,8 +57,8 @@ def test_a_daemon_that_was_killed_goes_on_bit_for_bit(tmp_path):
         listener.ask(rig.opening()[1:2], lambda s: s.background_mask, "the background")
         resumed = feed(listener, KILLED, COUNT)
         words = finish().words
-        assert re.search(rf"following the person of frame {KILLED - 1}, captured [0-9.]+ s ago, if ", words)
-        assert "if the next frame is at most 2 s later" in words
+        assert re.search(rf"the person of frame {KILLED - 1}, captured [0-9.]+ s ago, is followed if ", words)
+        assert "the next frame was captured at most 2 s later; otherwise the search begins again" in words
     whole = rig.play(rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, COUNT)]))
     assert resumed.tracker_digest == whole.estimates[-1].tracker_digest
     assert (tmp_path / "state").exists()  # written once more at the end
@@ -68,7 +68,7 @@ def test_a_daemon_that_was_killed_goes_on_bit_for_bit(tmp_path):
 def test_a_snapshot_that_does_not_fit_is_not_used(tmp_path):
     url = followed(tmp_path)
     good = (tmp_path / "state").read_bytes()
-    torn = [good[:n] for n in (0, 7, 100, len(good) // 2, len(good) - 1)]
+    torn = [good[:n] for n in (0, 1, 4, 7, 100, len(good) // 2, len(good) - 1)]
     flipped = [
         good[:k] + bytes([good[k] ^ 1]) + good[k + 1 :] for k in (7, 8, 12, len(good) // 2, len(good) - 9)
     ]
@@ -82,7 +82,7 @@ def test_a_snapshot_that_does_not_fit_is_not_used(tmp_path):
         with rig.daemon(url, *options(tmp_path, *more)) as (listener, finish):
             assert listener.last.state != listener.last.RUNNING
             words = finish().words
-        assert words.count("is not used: " + why) == 1 and "following" not in words, (more, len(content))
+        assert words.count("is not used: " + why) == 1 and "is followed" not in words, (more, len(content))
         assert (tmp_path / "state").read_bytes() == content  # it stays for the daemon that it fits
 
 
@@ -98,7 +98,7 @@ def test_a_camera_that_is_announced_replaces_that_of_a_snapshot(tmp_path):
     with rig.daemon(url, *options(tmp_path)) as (listener, finish):
         other = camera_message(rig.CAMERA.scaled(0.5), 1)
         listener.ask([("GAIT_CAMERA_0", other)], lambda s: s.state == s.READY, "the other camera")
-        assert "following the person" in finish().words
+        assert "is followed if" in finish().words
 
 
 def test_a_folder_that_can_no_longer_be_written_is_reported_once(tmp_path):

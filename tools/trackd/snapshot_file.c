@@ -200,7 +200,7 @@ static void sweep(const char *path)
         close(folder);
 }
 
-/* Whether a file may be replaced: it is not there, empty, or a snapshot, of whichever version. */
+/* Whether a file may be replaced: it is not there, or a snapshot of whichever version, however much of it. */
 static bool is_replaceable(const char *path)
 {
     char begin[FAMILY];
@@ -210,10 +210,11 @@ static bool is_replaceable(const char *path)
     if (!S_ISREG(is.st_mode))
         return false;
     FILE *const f = fopen(path, "rb");
-    size_t const bytes = f ? fread(begin, 1, sizeof begin, f) : 1;
-    if (f)
-        fclose(f);
-    return bytes == 0 || (bytes == sizeof begin && memcmp(begin, MAGIC, sizeof begin) == 0);
+    if (!f)
+        return false;
+    size_t const bytes = fread(begin, 1, sizeof begin, f);
+    fclose(f);
+    return memcmp(begin, MAGIC, bytes) == 0;
 }
 
 bool snapshot_file_check(const snapshot_file *f, message *why)
@@ -378,8 +379,9 @@ static bool resume(const char *path, service *s, const file_bytes *file, message
         if (r.person)
             snprintf(who, sizeof who, "person %d", (int)r.person);
         if (resume_person(s, &r, state, why))
-            log_line("--snapshot %.120s: following %s of frame %" PRId64
-                     ", captured %.1f s ago, if the next frame is at most %g s later",
+            log_line("--snapshot %.120s: %s of frame %" PRId64
+                     ", captured %.1f s ago, is followed if the next "
+                     "frame was captured at most %g s later; otherwise the search begins again",
                      path, who, r.frame, 1e-6 * (double)(clock_wall() - r.utime), s->shared->max_gap);
         else
             log_line("--snapshot %.120s: %s is not used: %.90s", path, who, why->text);
