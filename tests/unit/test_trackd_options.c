@@ -104,7 +104,9 @@ static void test_file(void)
                "seconds = 3"));
     CHECK(v.flag && strcmp(v.text, "a # b") == 0 && v.whole == 7 && v.seed == 9 && v.share == 0.25f);
     CHECK(v.seconds == 3 && file("text = 'it \"is\"'\n") && strcmp(v.text, "it \"is\"") == 0);
-    CHECK(file("text = plain words\n") && strcmp(v.text, "plain words") == 0);
+    CHECK(file("\xef\xbb\xbfwhole = 3\nshare = +1.0e-1\nseconds = -0.5E0\nseed = 0\nflag = false") &&
+          v.whole == 3);
+    CHECK(v.share == 0.1f && v.seconds == -0.5 && v.seed == 0 && !v.flag);
 }
 
 static void test_bad_files(void)
@@ -122,6 +124,19 @@ static void test_bad_files(void)
         {"text = 'a'b'\n", "give a string in plain quotes"},
         {"text = \"a\\n\"\n", "give a string in plain quotes"},
         {"text = \"\"\n", "give a value of 1 to"},
+        {"text = plain words\n", "text: give a string in plain quotes"},
+        {"text = /path\n", "text: give a string in plain quotes"},
+        {"flag = yes\n", "--flag yes: give true or false"},
+        {"flag = no\n", "--flag no: give true or false"},
+        {"flag = \"true\"\n", "flag: give the value without quotes"},
+        {"whole = \"2\"\n", "whole: give the value without quotes"},
+        {"whole =\n", "give a whole number"},
+        {"whole = 0x10\n", "--whole 0x10: give a number such as 12"},
+        {"whole = 07\n", "--whole 07: give a number such as 12"},
+        {"share = .5\n", "--share .5: give a number such as 12"},
+        {"share = 1.\n", "--share 1.: give a number such as 12"},
+        {"seed = +\n", "give a whole number"},
+        {"\xef\xbb\xbf\xef\xbb\xbfwhole = 3\n", "unknown option"},
         {"whole = seven\n", "line 1: --whole seven: give a whole number"},
         {"text = a\001b\n", "not a text file"},
         {"text = a\177b\n", "not a text file"},

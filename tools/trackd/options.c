@@ -152,19 +152,55 @@ static void cut_comment(char *line)
     }
 }
 
-/* The text of a TOML string, or the value itself if it is not a string; NULL: it has escapes, or its quotes do not
- * close. */
+static bool is_quoted(const char *value)
+{
+    return value[0] == '"' || value[0] == '\'';
+}
+
+/* The text of a TOML string; NULL: it is none, has escapes, or its quotes do not close. */
 static const char *unquote(char *value)
 {
     size_t const n = strlen(value);
     char const quote = value[0];
-    if (quote != '"' && quote != '\'')
-        return value;
-    if (n < 2 || value[n - 1] != quote || memchr(value + 1, quote, n - 2) ||
+    if (!is_quoted(value) || n < 2 || value[n - 1] != quote || memchr(value + 1, quote, n - 2) ||
         (quote == '"' && strchr(value, '\\')))
         return NULL;
     value[n - 1] = '\0';
     return value + 1;
+}
+
+/* Whether a number that C can read is also one of TOML: decimal, with digits on both sides of a point and no 0 before others. */
+static bool is_decimal(const char *text)
+{
+    static const char digits[] = "0123456789";
+    text += *text == '-' || *text == '+';
+    size_t n = strspn(text, digits);
+    bool ok = n == 1 || (n > 1 && *text != '0');
+    text += n;
+    if (*text == '.') {
+        n = strspn(++text, digits);
+        ok = ok && n > 0;
+        text += n;
+    }
+    return ok && (!*text || *text == 'e' || *text == 'E');
+}
+
+/* Set an option to a value as TOML writes its kind. */
+static bool set_toml(const option *o, char *value, message *why)
+{
+    if (o->kind == OPTION_TEXTUAL) {
+        const char *const text = unquote(value);
+        return text ? set_text(o, text, why)
+                    : message_set(why, "%s: give a string in plain quotes, without escapes", o->name);
+    }
+    if (is_quoted(value))
+        return message_set(why, "%s: give the value without quotes", o->name);
+    if (o->kind == OPTION_FLAG)
+        return (strcmp(value, "yes") != 0 && strcmp(value, "no") != 0 && set_flag(o, value, why)) ||
+               message_set(why, "--%s %s: give true or false", o->name, value);
+    return set(o, value, why) &&
+           (is_decimal(value) ||
+            message_set(why, "--%s %s: give a number such as 12, 0.5 or 1e-3", o->name, value));
 }
 
 /* Apply one line of the file; modifies the line. */
@@ -182,10 +218,7 @@ static bool apply_line(const option *table, int count, options_source *file, cha
     const option *const o = find(table, count, name, strlen(name));
     if (!o)
         return message_set(why, "unknown option %s; --help lists them", name);
-    const char *const value = unquote(trim(equals + 1));
-    if (!value)
-        return message_set(why, "%s: give a string in plain quotes, without escapes", o->name);
-    return claim(file, o, &file->given[o - table], why) && set(o, value, why);
+    return claim(file, o, &file->given[o - table], why) && set_toml(o, trim(equals + 1), why);
 }
 
 /* Control characters are refused, because error messages would pass them on to the terminal. */
@@ -210,6 +243,7 @@ bool options_file(const option *table, int count, const char *path, message *why
         return message_set(why, "%.100s: not a text file; give lines `name = value`", path);
     }
     char *line = (char *)bytes.data;
+    line += strncmp(line, "\xef\xbb\xbf", 3) == 0 ? 3 : 0; /* a byte order mark */
     while (ok && line) {
         char *const end = strchr(line, '\n');
         if (end)
