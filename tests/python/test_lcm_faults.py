@@ -311,7 +311,7 @@ def test_version_states_whether_jpeg_is_understood():
 def test_configuration_file_and_command_line(tmp_path):
     log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 3)])
     config = tmp_path / "trackd.conf"
-    config.write_text("# for the test\nseed = 5\n\n  phase-noise=0.2 # loose\nparticles-channel = yes\n")
+    config.write_text("# for the test\nseed = 5\n\n  phase-noise=0.2 # loose\nparticles-channel = true\n")
     by_file = rig.play(log, "--config", config)
     by_hand = rig.play(log, "--seed", 5, "--phase-noise", 0.2)
     assert by_file.digest == by_hand.digest and len(by_file.particles) == 3
@@ -350,13 +350,13 @@ def test_a_url_to_publish_on_that_lcm_refuses(tmp_path):
         ("nonsense://", "; give udpm://ADDRESS:PORT or file:///PATH?speed=0", ""),
         (
             "udpm://999.1.1.1:7667",
-            "ip route add 224.0.0.0/4 dev lo",
+            "999.1.1.1 is not a multicast address",
             "; give udpm://239.255.76.67:7667?ttl=0",
         ),
     ],
 )
 def test_a_url_that_lcm_refuses(url, remedy, of_python):
-    fails(rig.command("--url", url)[1:], url, "cannot open LCM", remedy)
+    fails(rig.command("--url", url)[1:], url, remedy)
     done = rig.gait("record", "--url", url, "-o", "x.csv")
     assert done.returncode == 1 and (of_python or remedy) in done.stderr
 

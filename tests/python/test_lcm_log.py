@@ -237,7 +237,8 @@ def test_a_time_that_is_none_stops_nothing(time, tmp_path):
     ]
     plain = track(tmp_path, [*rig.opening(), *rig.frames(0, 4)])
     outcome = track(tmp_path, [*rig.opening(), *rig.frames(0, 2), *strangers, *rig.frames(2, 4)])
-    assert f"time {time} is out of range; send microseconds since 1970" in outcome.words
+    for channel in ("GAIT_IMAGE_0", "GAIT_COMMAND"):
+        assert f"{channel}: time {time} is out of range; send microseconds since 1970" in outcome.words
     assert (outcome.digest, outcome.rejected) == (plain.digest, 1)
 
 

@@ -129,10 +129,17 @@ static void test_open(void)
     CHECK(refused("udpm://239.1.1.1:7667?ttl=0", "ip route add"));
     CHECK(refused("mpudpm://239.1.1.1:7667", "ip route add"));
     CHECK(refused("udpm://", "ip route add"));
-    CHECK(refused("udpm://a.name.longer.than.an.address:7667", "ip route add"));
+    CHECK(refused("udpm://239.1.1.1", "ip route add") && refused("udpm://:7667?ttl=0", "ip route add"));
+    CHECK(refused("udpm://a.name.longer.than.an.address:7667", "is not a multicast address"));
+    CHECK(refused("udpm://x", "udpm://x: x is not a multicast address"));
+    CHECK(refused("udpm://239.1.1.1:65536", "LCM has no such port; give one from 1 to 65535"));
+    CHECK(refused("udpm://239.1.1.1:99999?ttl=0", "LCM has no such port"));
+    CHECK(refused("udpm://239.1.1.1:", "LCM has no such port"));
+    CHECK(refused("file:///dev/null?speed=0", "/dev/null: cannot open this log: it is not a regular file"));
+    CHECK(refused("file:///dev?speed=0", "/dev: cannot open this log: it is not a regular file"));
     CHECK(refused("udpm://10.0.0.7:7667", "10.0.0.7 is not a multicast address"));
     CHECK(refused("other://", "give udpm://ADDRESS:PORT"));
-    CHECK(refused("file:///absent?speed=0", "/absent: cannot open this log"));
+    CHECK(refused("file:///absent?speed=0", "/absent: cannot open this log: No such file or directory"));
     CHECK(refused("file:///absent?mode=w", "/absent: liblcm cannot read this log"));
 }
 

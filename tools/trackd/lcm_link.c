@@ -42,11 +42,12 @@ static int64_t scan(const char *path, bool *safe, message *why)
 {
     struct stat is;
     int64_t at = 0, events = 0, size = 0;
-    FILE *const f =
-        stat(path, &is) == 0 && S_ISREG(is.st_mode) ? fopen(path, "rb") : NULL; /* a pipe would wait */
+    bool const there = stat(path, &is) == 0, regular = there && S_ISREG(is.st_mode); /* a pipe would wait */
+    FILE *const f = regular ? fopen(path, "rb") : NULL;
     *safe = false;
     if (!f) {
-        message_set(why, "%.160s: cannot open this log; give file:///PATH?speed=0", path);
+        message_set(why, "%.160s: cannot open this log: %s", path,
+                    there && !regular ? "it is not a regular file" : strerror(errno));
         return -1;
     }
     why->text[0] = '\0';
@@ -140,20 +141,28 @@ char link_log(const char *url, char path[LINK_PATH])
     return mode;
 }
 
-/* Whether udpm://ADDRESS:PORT has an address that LCM cannot send to; returns it. */
-static bool not_multicast(const char *url, char address[INET_ADDRSTRLEN])
+/* Whether udpm://ADDRESS:PORT has an address or a port that LCM cannot send to. */
+static bool is_unreachable(const char *url, message *why)
 {
+    enum { LAST_PORT = 65535 };
     struct in_addr in;
-    size_t const length = strncmp(url, "udpm://", 7) == 0 ? strcspn(url + 7, ":?") : 0;
-    if (length == 0 || length >= INET_ADDRSTRLEN)
+    char address[INET_ADDRSTRLEN + 1], *end;
+    if (strncmp(url, "udpm://", 7) != 0)
         return false;
-    snprintf(address, INET_ADDRSTRLEN, "%.*s", (int)length, url + 7);
-    return inet_pton(AF_INET, address, &in) == 1 && !IN_MULTICAST(ntohl(in.s_addr));
+    const char *const place = url + 7, *const after = place + strcspn(place, ":?");
+    snprintf(address, sizeof address, "%.*s", (int)(after - place), place);
+    if (after > place && (inet_pton(AF_INET, address, &in) != 1 || !IN_MULTICAST(ntohl(in.s_addr))))
+        return !message_set(
+            why, "%.100s: %.60s is not a multicast address; give one from 224.0.0.0 to 239.255.255.255", url,
+            address);
+    long const port = *after == ':' ? strtol(after + 1, &end, 10) : 1;
+    return (port < 1 || port > LAST_PORT) &&
+           !message_set(why, "%.100s: LCM has no such port; give one from 1 to %d", url, LAST_PORT);
 }
 
 lcm_t *link_open(const char *url, message *why)
 {
-    char path[LINK_PATH], address[INET_ADDRSTRLEN];
+    char path[LINK_PATH];
     bool safe = true;
     if (link_is_log(url) && link_log(url, path) == 'r' && (scan(path, &safe, why) < 0 || !safe))
         return NULL;
@@ -162,9 +171,8 @@ lcm_t *link_open(const char *url, message *why)
     unmute();
     if (!lcm && link_is_log(url))
         message_set(why, "%.160s: liblcm cannot read this log", path);
-    else if (!lcm && not_multicast(url, address))
-        message_set(why, "%.100s: %s is not a multicast address; give one from 224.0.0.0 to 239.255.255.255",
-                    url, address);
+    else if (!lcm && is_unreachable(url, why))
+        return NULL;
     else if (!lcm && strstr(url, "udpm://")) /* or mpudpm:// */
         message_set(why, "%.120s: cannot open LCM; " ROUTE_REMEDY, url);
     else if (!lcm)

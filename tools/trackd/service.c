@@ -374,12 +374,13 @@ void service_background(service *s, const image_view *v)
 static void command_start(service *s, const gaitmsg_command_t *msg)
 {
     const frame_hold *const hold = &s->shared->hold;
+    char channel[LINK_CHANNEL];
     gait_state mean, sd;
     message why;
     if (!clock_check(msg->utime, &why) ||
         !convert_state_message(&msg->mean, &s->track.prior_mean, &mean, &why) ||
         !convert_state_message(&msg->sd, &s->track.prior_sd, &sd, &why)) {
-        service_complain(s, "%s", why.text);
+        service_complain(s, "%s: %s", link_channel("GAIT_COMMAND", s->person, channel), why.text);
     } else if (start_usable(s, &mean, &sd)) {
         start_trigger_by_time(&s->start, &mean, &sd, msg->utime, hold->bytes ? hold->utime : -1);
         s->seek = !s->has_init;

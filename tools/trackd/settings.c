@@ -64,11 +64,14 @@ static const char *option_help(const setting *s)
 {
     static char helps[SETTING_COUNT][256];
     char *const help = helps[s - SETTINGS];
-    char paper[40] = "";
+    char usual[40], paper[40] = "";
+    snprintf(usual, sizeof usual, "%g", strcmp(s->name, "lag") == 0 ? USUAL_LAG : s->usual);
+    if (strcmp(s->name, "tasks") == 0)
+        snprintf(usual, sizeof usual, "the number of --threads");
     if (s->paper != s->usual)
         snprintf(paper, sizeof paper, ", paper mode %g", s->paper);
-    snprintf(help, sizeof helps[0], "%s\n        %s%sdefault %g%s", s->meaning, s->unit, *s->unit ? "; " : "",
-             strcmp(s->name, "lag") == 0 ? USUAL_LAG : s->usual, paper);
+    snprintf(help, sizeof helps[0], "%s\n        %s%sdefault %s%s", s->meaning, s->unit, *s->unit ? "; " : "",
+             usual, paper);
     return help;
 }
 
@@ -124,8 +127,8 @@ static int make_table(settings *s, option *table)
          "        (?mode=a to append)",
          TEXT(out)},
         {"config", 0, "FILE",
-         "TOML: lines `name = value` with the long names of these options; the command line takes\n"
-         "        precedence",
+         "TOML: lines `name = value` with the long names of these options, texts in quotes, flags true or\n"
+         "        false; the command line takes precedence",
          TEXT(config)},
         {"snapshot", 0, "FILE",
          "live, with --init auto: save the state of every tracker in FILE while someone is followed, and\n"
@@ -162,8 +165,7 @@ static int make_table(settings *s, option *table)
          "most pixels of all cameras together: a camera message with more is rejected, so that it\n"
          "        cannot exhaust memory; default 8388608, enough for four cameras of 1920x1080",
          INT(max_pixels, 1, GAIT_MAX_PIXELS * GAIT_MAX_PIXELS)},
-        {"threads", 't', "N",
-         "threads, default 1, which is also the default of --tasks; results do not depend on it",
+        {"threads", 't', "N", "threads, default 1; results do not depend on it",
          INT(threads, 1, GAIT_POOL_MAX)},
         {"cpu-mask", 0, "N",
          "sum of the instruction sets to use: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512, 8 SSE4.1; 0: none;\n"
