@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import subprocess
 
 import lcm_rig as rig
 import numpy as np
@@ -306,6 +307,19 @@ def test_version_states_whether_jpeg_is_understood():
     outcome = rig.run("--version")
     assert outcome.code == 0
     assert outcome.printed in [f"gait-trackd {gait.__version__} jpeg {answer}\n" for answer in ("yes", "no")]
+
+
+@pytest.mark.parametrize("word", ["--version", "--help"])
+def test_an_answer_that_cannot_be_written_is_reported(word):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([rig.TRACKD, word], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    printed = "gait-trackd: stdout cannot be written: No space left on device\n"
+    assert (done.returncode, done.stderr) == (1, printed)
+
+
+def test_the_default_of_tasks_is_the_number_of_threads():
+    words = rig.run("--help").printed.partition("--tasks N")[2].partition("--")[0]
+    assert "default the number of" in words
 
 
 def test_configuration_file_and_command_line(tmp_path):

@@ -357,23 +357,33 @@ static int failed(const message *why, int code)
     return code;
 }
 
+/* Exit code of an answer on stdout. */
+static int answered(void)
+{
+    message why;
+    if (fflush(stdout) == 0 && !ferror(stdout))
+        return 0;
+    (void)message_set(&why, "stdout cannot be written: %s", strerror(errno));
+    return failed(&why, 1);
+}
+
 int main(int argc, char **argv)
 {
     static instance only;
     invocation call = {.argc = argc, .argv = argv};
     message why;
     option_result const result = settings_read(&only.want, argc, argv, &why);
-    if (result == OPTION_HELP)
-        settings_help();
     if (result == OPTION_BAD)
         return failed(&why, 2);
-    if (result == OPTION_HELP)
-        return 0;
+    if (result == OPTION_HELP) {
+        settings_help();
+        return answered();
+    }
     if (only.want.version) {
         uint32_t const v = gait_version();
         printf("gait-trackd %u.%u.%u jpeg %s\n", v / 10000, v / 100 % 100, v % 100,
                jpeg_supported() ? "yes" : "no");
-        return 0;
+        return answered();
     }
     set_signals(&call.unblocked);
     bool ok = serve(&only, &call, &why);
