@@ -588,7 +588,7 @@ screenshots: setup lib ## the figures of the pages and the tutorial's pictures, 
 C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] tests/python/*.c \
            tools/trackd/*.[ch]))
 SBOM := build/sbom
-sbom: setup $(PACKAGING)/.ready ## all components with versions, hashes and licences (CycloneDX): build/sbom/libgait.cdx.json
+sbom: setup $(PACKAGING)/.ready ## components with versions, licences and known hashes (CycloneDX): build/sbom/libgait.cdx.json
 	@mkdir -p $(SBOM)
 	@$(PACKAGING)/bin/cyclonedx-py environment $(VENV)/bin/python --pyproject python/pyproject.toml --mc-type library \
 	    --output-reproducible --output-file $(SBOM)/packages.json 2>$(SBOM)/log || { cat $(SBOM)/log >&2; exit 1; }

@@ -3,9 +3,9 @@
 
     sbom.py PACKAGES.json -o SBOM.json
 
-Adds the hashes of python/lock.txt, licences that packages do not declare, the shared libraries inside the
-packages, Eigen in the C library, the system's libjpeg in the daemon, and the files that `--fetch` downloads:
-the detector's weights and the parts of pages.  `make sbom` calls this.
+Adds the version of libgait, the hashes of python/lock.txt, licences that packages do not declare, the shared
+libraries inside the packages, Eigen in the C library, the system's libjpeg in the daemon, and the files that
+`--fetch` downloads: the detector's weights and the parts of pages.  `make sbom` calls this.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from importlib.metadata import PackageNotFoundError, files, version
 from pathlib import Path
 from typing import Any
 
+from gait._version import __version__
 from gait.detect import weights
 from gait.io.files import replacing
 from gait.io.published import Published
@@ -63,7 +64,12 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
         "description": "headers, compiled into libgait (libgait/src/base/linalg.cpp)",
         "licenses": [{"license": {"id": "MPL-2.0"}}],
     }
-    return document | {"components": [*packages, eigen, *system_jpeg(), *map(fetched, LICENCES)]}
+    metadata = document.get("metadata", {})
+    own = metadata.get("component", {"type": "library", "name": "libgait"}) | {"version": __version__}
+    return document | {
+        "metadata": metadata | {"component": own},
+        "components": [*packages, eigen, *system_jpeg(), *map(fetched, LICENCES)],
+    }
 
 
 def system_jpeg() -> list[dict[str, Any]]:
@@ -76,7 +82,7 @@ def system_jpeg() -> list[dict[str, Any]]:
         "type": "library",
         "name": "libjpeg",
         "version": asked.stdout.strip(),
-        "description": "of the system, linked by gait-trackd",
+        "description": "of the system, linked by gait-trackd; the system's package manager has its hash",
         "licenses": [{"expression": "IJG AND BSD-3-Clause"}],
     }
     return [found] if asked.returncode == 0 else []
@@ -122,6 +128,7 @@ def fetched(file: Published) -> dict[str, Any]:
     return {
         "type": "machine-learning-model" if file in weights.STORE.files else "file",
         "name": file.file,
+        "version": re.split("==|@", file.package)[-1],
         "description": f"{file.member} of {file.package}, downloaded by --fetch",
         "hashes": [{"alg": "SHA-256", "content": file.sha256}],
         "licenses": [{"license": {"id": LICENCES[file]}}],

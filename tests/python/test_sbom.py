@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from gait._version import __version__
 from gait.detect import weights
 from gait.web import parts
 
@@ -28,7 +29,9 @@ def test_the_bill_has_what_is_compiled_in_inside_wheels_and_fetched(sbom):
     lock = sbom.LOCK.read_text()
     number = re.search(r"^lcm==(\S+)", lock, re.MULTILINE)[1]
     packages.append({"name": "LCM", "version": number, "type": "library"})
-    bill = sbom.complete({"components": packages, "bomFormat": "CycloneDX"})
+    own = {"metadata": {"component": {"name": "libgait"}, "tools": []}}
+    bill = sbom.complete({"components": packages, "bomFormat": "CycloneDX"} | own)
+    assert bill["metadata"] == {"component": {"name": "libgait", "version": __version__}, "tools": []}
     assert bill["bomFormat"] == "CycloneDX"
     found = {one["name"]: one for one in bill["components"]}
     inside = {one["name"].split("-")[0]: one for one in found["av"]["components"]}
@@ -49,6 +52,7 @@ def test_the_bill_has_what_is_compiled_in_inside_wheels_and_fetched(sbom):
     )
     assert ("libjpeg" in found) == (asked is not None and asked.returncode == 0)
     for file in (*weights.STORE.files, *parts.STORE.files):
+        assert file.package.endswith(found[file.file]["version"]) and found[file.file]["version"][0].isdigit()
         assert found[file.file]["hashes"] == [{"alg": "SHA-256", "content": file.sha256}]
 
 
