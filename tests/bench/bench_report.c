@@ -1,9 +1,11 @@
 #include "bench_report.h"
+#include "trackd/options.h"
 
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { MAX_RESULTS = 128, MAX_OTHERS = 16 };
 
@@ -94,6 +96,17 @@ void bench_report_stages(const bench_result *const *runs, int n)
     }
     printf("edges: all that the kernels of the other terms leave of them, calls and the counting of points "
            "included\n");
+}
+
+bool bench_report_can_write(const char *path, message *why)
+{
+    const char *const slash = strrchr(path, '/');
+    char folder[OPTION_TEXT] = ".";
+    if (slash)
+        snprintf(folder, sizeof folder, "%.*s", (int)(slash == path ? 1 : slash - path), path);
+    bool const there = access(path, F_OK) == 0;
+    return access(there ? path : folder, W_OK) == 0 ||
+           message_set(why, "%.120s: cannot be written: %s", path, strerror(errno));
 }
 
 bool bench_report_csv(const char *path, message *why)

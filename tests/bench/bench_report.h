@@ -14,5 +14,7 @@ void bench_report_head(const char *section, const char *title);
 void bench_report_rows(const bench_result *r, int32_t count);
 /* Stages of several runs side by side, nanoseconds per particle; for features milliseconds per step. */
 void bench_report_stages(const bench_result *const *runs, int count);
+/* Whether the table of figures could be written there, without creating it. */
+bool bench_report_can_write(const char *path, message *why);
 bool bench_report_csv(const char *path, message *why);
 #endif

@@ -16,21 +16,34 @@ enum { FRAMES = 90, SEARCH_FRAMES = 30, LARGE_FRAMES = 30, MANY = 10000 };
 typedef struct settings {
     char model[OPTION_TEXT], particles[OPTION_TEXT], threads[OPTION_TEXT], csv[OPTION_TEXT];
     int32_t steps;
+    int32_t particles_of[BENCH_TURNS], threads_of[BENCH_TURNS]; /* the lists above, as numbers */
+    int sizes, threadings;
 } settings;
 
-/* "100,1000" to numbers in [1, high]; returns how many, 0 if it is not such a list. */
-static int numbers(const char *text, long high, int32_t out[BENCH_TURNS])
+/* "100,1000" to numbers in [low, high]; false, with the reason, if it is not such a list. */
+static bool numbers(const char *option, const char *text, long low, long high, int32_t out[BENCH_TURNS],
+                    int *count, message *why)
 {
-    int count = 0;
-    for (char *end; count < BENCH_TURNS; text = end + 1) {
-        long const v = strtol(text, &end, 10);
-        if (end == text || v < 1 || v > high || (*end != ',' && *end != '\0'))
-            return 0;
-        out[count++] = (int32_t)v;
+    const char *at = text;
+    *count = 0;
+    for (char *end; *count < BENCH_TURNS; at = end + 1) {
+        long const v = strtol(at, &end, 10);
+        if (end == at || v < low || v > high || (*end != ',' && *end != '\0'))
+            break;
+        out[(*count)++] = (int32_t)v;
         if (*end == '\0')
-            return count;
+            return true;
     }
-    return 0;
+    return message_set(why, "%s %.80s: give one to %d numbers from %ld to %ld with commas between", option,
+                       text, BENCH_TURNS, low, high);
+}
+
+/* What the table of options cannot check, before anything is measured. */
+static bool check(settings *set, message *why)
+{
+    return numbers("--particles", set->particles, 16, 1 << 20, set->particles_of, &set->sizes, why) &&
+           numbers("--threads", set->threads, 1, GAIT_POOL_MAX, set->threads_of, &set->threadings, why) &&
+           (!set->csv[0] || bench_report_can_write(set->csv, why));
 }
 
 typedef struct bench {
@@ -214,16 +227,11 @@ static bool threads_of(bench *b, int32_t particles, const int32_t *threads, int 
 
 static bool sweep(bench *b)
 {
-    int32_t particles[BENCH_TURNS], threads[BENCH_TURNS];
-    int const count = numbers(b->set->particles, 1 << 20, particles),
-              counts = numbers(b->set->threads, GAIT_POOL_MAX, threads);
-    if (!count || !counts)
-        return message_set(b->why, "--particles and --threads want up to %d numbers like 100,1000",
-                           BENCH_TURNS);
-    bool ok = sizes(b, particles, count);
+    const settings *const set = b->set;
+    bool ok = sizes(b, set->particles_of, set->sizes);
     bench_report_head("threads", "particles and threads");
-    for (int i = 0; ok && i < count; i++)
-        ok = threads_of(b, particles[i], threads, counts);
+    for (int i = 0; ok && i < set->sizes; i++)
+        ok = threads_of(b, set->particles_of[i], set->threads_of, set->threadings);
     return ok;
 }
 
@@ -306,7 +314,10 @@ static bool bench_model(const settings *set, message *why)
 
 int main(int argc, char **argv)
 {
-    settings set = {"python/gait/data/walk.gait", "1000,3000,10000,30000,100000", "1,2", "", 80};
+    settings set = {.model = "python/gait/data/walk.gait",
+                    .particles = "1000,3000,10000,30000,100000",
+                    .threads = "1,2",
+                    .steps = 80};
     const option table[] = {
         {"model", 'm', "FILE", "model blob", OPTION_TEXTUAL, set.model, 0, 0},
         {"particles", 'n', "N,N...", "numbers of particles, default 1000,3000,10000,30000,100000",
@@ -324,9 +335,11 @@ int main(int argc, char **argv)
         options_help(table, count);
         return 0;
     }
-    if (parsed == OPTION_BAD || !bench_model(&set, &why)) {
+    bool const sound = parsed != OPTION_BAD && check(&set, &why);
+    setvbuf(stdout, NULL, _IOLBF, BUFSIZ); /* lines as they come, also into a file or over ssh */
+    if (!sound || !bench_model(&set, &why)) {
         fprintf(stderr, "step: %s\n", why.text);
-        return parsed == OPTION_BAD ? 2 : 1;
+        return sound ? 1 : 2;
     }
     return 0;
 }

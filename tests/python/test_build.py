@@ -93,6 +93,20 @@ def test_a_library_without_threads_needs_none(tmp_path):
     assert "pthread" not in symbols and "gait_pool" not in symbols
 
 
+def test_the_bench_checks_all_options_before_it_measures(tmp_path):
+    step = "build/release/bench/step"
+    subprocess.run(["make", "-s", step], cwd=ROOT, timeout=600, check=True)
+    for option, value in (
+        *(("--particles", text) for text in ("2000,x", "0", "100,", "99999999999", "")),
+        *(("--threads", text) for text in ("0", "1,257", "1,1,1,1,1,1,1,1,1")),
+        *(("--csv", text) for text in (f"{tmp_path}/none/a.csv", f"{tmp_path}/none/")),
+    ):
+        words = [ROOT / step, option, value]
+        done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+        assert (done.returncode, done.stdout) == (2, "") and done.stderr.count("\n") == 1
+        assert value in done.stderr and (option in done.stderr or option == "--csv")
+
+
 @pytest.mark.parametrize(
     ("words", "folder"), [((), "build/bench/"), (("ARGS=-s 9 --record",), "tests/bench/results/")]
 )
