@@ -47,6 +47,14 @@ def test_the_log_that_is_played_is_never_overwritten(tmp_path, link):
     assert source.read_bytes() == before
 
 
+def test_an_unfinished_log_that_is_played_is_not_overwritten(tmp_path):
+    source = log(tmp_path, name="out.unfinished.log")
+    before = source.read_bytes()
+    done = run(source, f"file://{tmp_path / 'out.log'}?mode=w")
+    one_line(done, 2, "would overwrite the log of --url", "another name")
+    assert source.read_bytes() == before
+
+
 def test_a_daemon_that_cannot_start_leaves_the_old_log(tmp_path):
     out = log(tmp_path, name="out.log")
     before = out.read_bytes()

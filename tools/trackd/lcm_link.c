@@ -231,6 +231,13 @@ static void name_beside(const char *path, char beside[LINK_PATH])
     snprintf(beside, LINK_PATH, "%.*s.unfinished%.*s", stem, path, LINK_PATH - ADDED - stem, suffix);
 }
 
+void link_unfinished(const char *path, char beside[LINK_PATH])
+{
+    char target[LINK_PATH];
+    follow(path, target);
+    name_beside(target, beside);
+}
+
 /* Set the names of the log of this URL, and return its mode. */
 static char set_names(sink *s, const char *url, char path[LINK_PATH])
 {

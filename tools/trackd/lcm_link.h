@@ -30,6 +30,8 @@ lcm_subscription_t *link_subscribe(lcm_t *lcm, const char *channel, lcm_msg_hand
 bool link_is_log(const char *url);
 /* Path of a log, and its mode: 'r', 'w' or 'a', 0 if ?mode= is anything else. */
 char link_log(const char *url, char path[LINK_PATH]);
+/* NAME.unfinished.SUFFIX beside a log, or beside what a link to it points to: a new log is written there until it is complete. */
+void link_unfinished(const char *path, char beside[LINK_PATH]);
 
 /* ---- output to LCM, or to a log with checked writes (LCM's own log provider does not report failures). */
 typedef struct sink {       /* all zero: no output */
@@ -37,7 +39,7 @@ typedef struct sink {       /* all zero: no output */
     lcm_eventlog_t *log;    /* or NULL */
     int lock, other;        /* with a log: descriptors that lock what is written and its other name, or -1 */
     char path[LINK_PATH];   /* of the log, not of a link to it */
-    char beside[LINK_PATH]; /* NAME.unfinished.SUFFIX, to which a new log is written until it is complete */
+    char beside[LINK_PATH]; /* of link_unfinished() */
     bool fresh;             /* it is a new log */
     int64_t failed;         /* messages that did not go out */
     message fault;          /* of the first of them */

@@ -291,7 +291,7 @@ static bool same_file(const char *a, const char *b)
 /* The log that is played is only read; the one that is written must not be one of the input files. */
 static bool check_logs(const settings *s, message *why)
 {
-    char from[LINK_PATH] = "", to[LINK_PATH];
+    char from[LINK_PATH] = "", to[LINK_PATH], unfinished[LINK_PATH];
     const char *const read[] = {from, s->model, s->camera, s->background, s->init, s->config, s->lift_model};
     if (link_is_log(link_url(s->url)) && link_log(link_url(s->url), from) != 'r')
         return message_set(why,
@@ -302,8 +302,9 @@ static bool check_logs(const settings *s, message *why)
     if (mode != 'w' && mode != 'a')
         return message_set(why, "--out %.160s: not a log to write; add ?mode=w (new) or ?mode=a (append)",
                            s->out);
+    link_unfinished(to, unfinished);
     for (size_t i = 0; i < sizeof read / sizeof *read; i++)
-        if (read[i][0] && same_file(read[i], to))
+        if (read[i][0] && (same_file(read[i], to) || same_file(read[i], unfinished)))
             return message_set(why,
                                "--out %.160s: would overwrite %.40s, which is an input; give another name",
                                s->out, i ? "a file" : "the log of --url");
