@@ -12,7 +12,7 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
-from gait.lcm.link import private_url
+from gait.lcm.link import events_of, private_url
 from gait.live import server
 from gait.live.feed import Feed
 from gait.live.server import Hub, Pace, Page
@@ -49,7 +49,7 @@ def live(reports, tmp_path, monkeypatch):
     browser.chromium()
     monkeypatch.setenv("GAIT_WEB", str(browser.FETCHED))
     page = Page(0, [0], private_url(), tmp_path)
-    page.begin(reports[2].page_data)
+    page.begin(reports[2].page_data, reports[2].scene)
     yield page
     page.close()
 
@@ -190,7 +190,7 @@ def test_several_people_have_numbers_and_figures_of_their_own(reports, tmp_path,
     monkeypatch.setenv("GAIT_WEB", str(browser.FETCHED))
     url, people = private_url(), [private_url(), private_url()]
     live = Page(0, [0], url, tmp_path, people)
-    live.begin(lambda: reports[2].page_data() | {"people": people})
+    live.begin(lambda: reports[2].page_data() | {"people": people}, {})
     try:
         with browser.opened() as page:
             page.goto(live.address)
@@ -213,7 +213,7 @@ def test_several_cameras_have_pictures_of_their_own(reports, tmp_path, monkeypat
     browser.chromium()
     monkeypatch.setenv("GAIT_WEB", str(browser.FETCHED))
     live = Page(0, [0, 3], private_url(), tmp_path)
-    live.begin(lambda: reports[2].page_data() | {"streams": [0, 3]})
+    live.begin(lambda: reports[2].page_data() | {"streams": [0, 3]}, {})
     try:
         with browser.opened() as page:
             page.goto(live.address)
@@ -268,7 +268,8 @@ def test_the_record_button_makes_a_log(live, tmp_path):
         page.click("#record")
         browser.until(page, "document.querySelector('#message').textContent.startsWith('Recorded in')")
         page.wait_for_timeout(100)
-    assert len(list(tmp_path.glob("gait-*.log"))) == 1
+    (log,) = tmp_path.glob("gait-*.log")
+    assert "GAIT_CAMERA_0" in {event.channel for event in events_of(log)}
 
 
 def test_browsers_get_less_often_what_a_busy_machine_shows_and_miss_no_sample(tmp_path, monkeypatch):
