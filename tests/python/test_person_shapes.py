@@ -18,7 +18,7 @@ from gait.io import blob
 from gait.io.video import Frame
 from gait.track import clip_background, person_shapes
 from gait.track.box_start import find_start
-from gait.track.follow import Follower
+from gait.track.follow import Decided, Follower
 from gait.track.person_shapes import PersonShapes
 
 MODEL = Model()
@@ -179,6 +179,11 @@ def start(frame, phase, sd=0.05):
     return Start(frame, mean, sds)
 
 
+def decided(at):
+    """Where a draw decided, with the phase at frame 10 by the rate in between."""
+    return at and Decided(at, at.mean.phase - at.mean.stride_hz * (at.frame - 10) / 30)
+
+
 A, LATER, OTHER = start(10, 0.2), start(40, 0.1), start(10, 0.7)
 
 
@@ -195,7 +200,7 @@ A, LATER, OTHER = start(10, 0.2), start(40, 0.1), start(10, 0.7)
 def test_left_and_right_are_known_only_if_all_draws_agree(monkeypatch, draws, first, uncertain):
     open_start, left = start(20, 0.0, sd=0.5), iter(draws)
     follower = Follower(None, SimpleNamespace(fps=30), None, None, None)
-    monkeypatch.setattr(follower, "_draw", lambda *_: next(left))
+    monkeypatch.setattr(follower, "_draw", lambda *_: decided(next(left)))
     assert follower._settled(open_start, range(90)) is (first or open_start)
     assert follower._uncertain is uncertain
 

@@ -399,10 +399,20 @@ class Walks(Script):
         return replace(now, mean=replace(mean, phase=(0.1 + mean.stride_hz * utime / 1e6) % 1))
 
 
-@pytest.mark.parametrize(("phase", "turn", "wanted"), [(0.12, 0, 0.12), (0.62, 0, 0.12), (0.12, np.pi, None)])
-def test_a_start_has_the_side_that_was_decided(estimate, phase, turn, wanted):
-    """If the hypothesis walks the other way, the track starts where the walk was decided, frame 6."""
-    mean = replace(estimate.mean, phase=phase, heading=estimate.mean.heading + turn)
+@pytest.mark.parametrize(
+    ("phase", "change", "wanted"),
+    [
+        (0.12, {}, 0.12),
+        (0.62, {}, 0.12),
+        (0.36, {}, None),
+        (0.12, {"heading": np.pi}, None),
+        (0.12, {"motion_class": 1}, None),
+        (0.12, {"stride_hz": 0.5}, 0.12),
+    ],
+)
+def test_a_start_has_the_side_that_was_decided(estimate, phase, change, wanted):
+    """If the hypothesis is of another walk, the track starts where the walk was decided, frame 6."""
+    mean = replace(estimate.mean, **{"phase": phase, **change})
     one = Hypothesis(mean, estimate.sd, 1.2, 0.1, 1.0, 1.0, False, True, np.eye(6))
     people = PersonKeypoints(camera(), {1: {n: found() for n in range(20)}}, 1)
     starts = []
@@ -417,6 +427,30 @@ def test_a_start_has_the_side_that_was_decided(estimate, phase, turn, wanted):
     assert len(rows) == 20 and starts[0] is None
     begin = 0.1 + 6 * estimate.mean.stride_hz / 30 if wanted is None else wanted
     assert starts[-1] == pytest.approx(begin, abs=1e-3)
+
+
+class Pauses(Walks):
+    """Walks that stand from frame 4 for as long as one and a half strides take."""
+
+    def like(self, config):
+        return Pauses(self.estimate, self.leaves, self.starts)
+
+    def step(self, image, utime, keypoints, poses, backgrounds, people):
+        number, pause = round(utime * 30 / 1e6), round(45 / self.estimate.mean.stride_hz)
+        stood = min(max(number - 4, 0), pause) / 30
+        now = super().step(image, round(utime - 1e6 * stood), keypoints, poses, backgrounds, people)
+        return replace(now, speed=0.0 if 4 < number <= 4 + pause else 1.2)
+
+
+def test_a_side_decided_after_a_stand_is_that_of_the_start(estimate):
+    mean = replace(estimate.mean, phase=0.12)
+    one = Hypothesis(mean, estimate.sd, 1.2, 0.1, 1.0, 1.0, False, True, np.eye(6))
+    people = PersonKeypoints(camera(), {1: {n: found() for n in range(90)}}, 1)
+    starts = []
+    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS)
+    follower = Follower(Pauses(estimate, -1, starts), Film(), people, plausible, lambda *_: None)
+    list(follower.follow(Start(0, mean, estimate.sd, hypotheses=(one,)), range(90)))
+    assert starts == [None, pytest.approx(0.12)]
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,11 +26,26 @@ _OPEN_PHASE = 0.2  # strides; sd of the phase from which a start does not determ
 _SETTLED_S = 0.2  # seconds of status `tracking` after which they are known
 _SETTLES = 4.0  # seconds after a start within which that must happen
 _DRAWS = 3  # draws of particles that must agree, if the phase is open
-_SAME_SIDE = 0.2  # strides between the phases of draws that agree
+_SAME_SIDE = 0.2  # strides between phases that agree
 _DISAGREE = "repeated starts disagree about left and right"
 
 FindAgain = Callable[[int, int, float], Start | None]
 """Finds the first start in frames first <= number < stop, of a person with a stature [m]; None if none."""
+
+
+class Decided(NamedTuple):
+    """Where a draw of particles has decided left and right.
+
+    Attributes
+    ----------
+    start : Start
+        There.
+    phase : float
+        Where the draw began, by its rates in between, strides.
+    """
+
+    start: Start
+    phase: float
 
 
 class _Support:
@@ -122,7 +138,7 @@ class Follower:
                 stop = frames.stop if following is None else following.frame
                 found = self._find_again(frame.number + 1, stop, now.mean.stature)
                 if found is not None:
-                    following, more = self._earlier(found, range(frame.number + 1, frames.stop))
+                    following, more = self._earlier(found, range(frame.number + 1, stop))
                     before |= more
             estimate = replace(now, status=TrackStatus.LOST) if lost else now
             yield frame, before.get(frame.number, estimate) if lost else estimate
@@ -140,9 +156,9 @@ class Follower:
             return start
         draws = [self._draw(start, frames, draw) for draw in range(_DRAWS)]
         found = [one for one in draws if one is not None]
-        agreeing = [sum(_apart(one, other, self._video.fps) < _SAME_SIDE for other in found) for one in found]
+        agreeing = [sum(_apart(one.phase, other.phase) < _SAME_SIDE for other in found) for one in found]
         self._uncertain = bool(found) and (len(found) < 2 or min(agreeing) < len(found))
-        return found[int(np.argmax(agreeing))] if found else start
+        return found[int(np.argmax(agreeing))].start if found else start
 
     def _sided(self, start: Start, frames: range) -> Start:
         """Decide left and right of a start with a known phase that was found in the clip.
@@ -153,10 +169,10 @@ class Follower:
         if not start.hypotheses or start.sd.phase >= _OPEN_PHASE:
             return start
         decided = self._draw(start, frames, 0)
-        return start if decided is None else _with_side(start, decided, self._video.fps)
+        return start if decided is None else _with_side(start, decided)
 
-    def _draw(self, start: Start, frames: range, draw: int) -> Start | None:
-        """Return a start where one draw of particles has decided; None if it does not soon."""
+    def _draw(self, start: Start, frames: range, draw: int) -> Decided | None:
+        """Return where one draw of particles has decided; None if it does not soon."""
         config = self._tracker.config.replace(seed=self._tracker.config.seed ^ draw)
         later = ((frame, frame.utime) for frame in self._video.frames(start.frame, frames.stop))
         found = self._decided(self._tracker.like(config), start, later)
@@ -166,23 +182,26 @@ class Follower:
             found = self._decided(self._tracker.like(config.replace(reverse=1.0)), start, earlier)
         return found
 
-    def _decided(self, tracker: Tracker, start: Start, frames: Iterator[tuple[Frame, int]]) -> Start | None:
-        """Return a start where a tracker has been `tracking` strides for a while; None if it is not soon.
+    def _decided(self, tracker: Tracker, start: Start, frames: Iterator[tuple[Frame, int]]) -> Decided | None:
+        """Return where a tracker has been `tracking` strides for a while; None if it is not soon.
 
         Standing shows neither the phase nor which leg is the right one.
         `frames`: with the tracker's time of each, microseconds.
         """
         now: Estimate | None = None
-        since = begun = 0.0
+        since = begun = before = strides = 0.0
         for frame, utime in frames:
             if now is None:
                 self._start(tracker, start, utime)
-                since = begun = frame.time
+                since = begun = before = frame.time
             now = self._step(tracker, frame, utime, now)
+            if now.takes_strides:
+                strides += now.mean.stride_hz * (frame.time - before)
+            before = frame.time
             if now.status != TrackStatus.TRACKING or not now.takes_strides:
                 since = frame.time
             if abs(frame.time - since) >= _SETTLED_S:
-                return _start_from(now, frame.number, start)
+                return Decided(_start_from(now, frame.number, start), now.mean.phase - strides)
             if abs(frame.time - begun) > _SETTLES:
                 break
         return None
@@ -200,7 +219,7 @@ class Follower:
         found = self._find_again(frames.start, stop, start.mean.stature)
         if found is None:
             return start, before
-        found, more = self._earlier(found, frames)
+        found, more = self._earlier(found, range(frames.start, stop))
         return found, before | more
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
@@ -254,26 +273,25 @@ class Follower:
         return {n: now for n, now in sorted(found.items()) if earliest <= n < start.frame}
 
 
-def _apart(one: Start, other: Start, fps: float) -> float:
-    """Strides by which two starts of the same walk differ in phase."""
-    seconds = (other.frame - one.frame) / fps
-    rate = (one.mean.stride_hz + other.mean.stride_hz) / 2
-    off = other.mean.phase - one.mean.phase - rate * seconds
-    return abs((off + 0.5) % 1 - 0.5)
+def _apart(one: float, other: float) -> float:
+    """Strides between two phases, 0 to 0.5."""
+    return abs((other - one + 0.5) % 1 - 0.5)
 
 
-def _with_side(start: Start, decided: Start, fps: float) -> Start:
-    """Choose the most probable hypothesis of a start in the direction of a walk, with the decided side.
+def _with_side(start: Start, decided: Decided) -> Start:
+    """Choose the most probable hypothesis of a start for a decided walk, with the decided side.
 
-    Where no hypothesis walks in that direction, the start is where the walk was decided.
+    Where no hypothesis walks in that direction and class at that phase or half a stride later, the start is
+    where the walk was decided.
     """
+    mean = decided.start.mean
     for one in start.hypotheses:
-        if np.cos(one.mean.heading - decided.mean.heading) > 0:
-            found = replace(start, mean=one.mean, sd=one.sd, in_place=one.in_place, hypotheses=())
-            if _apart(found, decided, fps) < 0.25:
-                return found
-            return replace(found, mean=replace(one.mean, phase=(one.mean.phase + 0.5) % 1))
-    return decided
+        same = one.in_place == start.in_place and one.mean.motion_class == mean.motion_class
+        off = _apart(one.mean.phase, decided.phase)
+        if same and np.cos(one.mean.heading - mean.heading) > 0 and abs(off - 0.25) > 0.25 - _SAME_SIDE:
+            phase = one.mean.phase if off < 0.25 else (one.mean.phase + 0.5) % 1
+            return replace(start, mean=replace(one.mean, phase=phase), sd=one.sd, hypotheses=())
+    return decided.start
 
 
 def _start_from(now: Estimate, frame: int, start: Start) -> Start:
