@@ -5,8 +5,10 @@ import os
 import re
 import signal
 import socket
+import subprocess
 import threading
 import time
+from contextlib import suppress
 from queue import SimpleQueue
 
 import lcm_rig as rig
@@ -220,6 +222,30 @@ def test_settings_with_which_the_program_could_not_start_are_not_reloaded(tmp_pa
     assert outcome.code == 0 and len(lines) == len(wrong), outcome.words
     for line, reason in zip(lines, wrong.values(), strict=True):
         assert line.startswith("gait-trackd: settings were not reloaded: ") and reason in line
+
+
+def test_a_stop_during_a_reload_is_not_lost(tmp_path, manager):
+    """The summary before the new start waits for its reader, so the stop always comes during the reload."""
+    source, drain = os.pipe()
+    os.set_blocking(drain, False)
+    with suppress(BlockingIOError):
+        while os.write(drain, b"x" * 4096):
+            pass
+    os.set_blocking(drain, True)
+    words = rig.command("--url", private_url())
+    with subprocess.Popen(words, stdout=drain, stderr=subprocess.DEVNULL) as daemon:
+        try:
+            os.close(drain)
+            assert manager() == "READY=1"
+            daemon.send_signal(signal.SIGHUP)
+            assert manager() == "RELOADING=1"
+            daemon.terminate()
+            with open(source, "rb") as summary:
+                summary.read(1 << 16)
+                assert manager() == "STOPPING=1"
+                assert daemon.wait(rig.PATIENCE) == 0 and b"frames 0 " in summary.read()
+        finally:
+            daemon.kill()
 
 
 @pytest.mark.parametrize("words", [["--url", "nonsense://"], ["--particles", "many"]])

@@ -388,8 +388,14 @@ int main(int argc, char **argv)
     set_signals(&call.unblocked);
     bool ok = serve(&only, &call, &why);
     if (ok && quit == RELOAD) {
-        sigprocmask(SIG_SETMASK, &call.unblocked, NULL);
         fflush(stdout);
+        sigprocmask(SIG_SETMASK, &call.unblocked, NULL); /* delivers what came during the reload */
+        signal(SIGTERM, SIG_DFL);                        /* from here on as in the new program */
+        signal(SIGINT, SIG_DFL);
+        if (quit == QUIT) {
+            manager_report("STOPPING=1");
+            return 0;
+        }
         execvp(argv[0], argv);
         ok = message_set(&why, "%.200s: cannot be restarted: %s", argv[0], strerror(errno));
     }
