@@ -21,7 +21,7 @@ typedef struct settings {
 } settings;
 
 /* "100,1000" to numbers in [low, high]; false, with the reason, if it is not such a list. */
-static bool numbers(const char *option, const char *text, long low, long high, int32_t out[BENCH_TURNS],
+static bool numbers(const char *name, const char *text, long low, long high, int32_t out[BENCH_TURNS],
                     int *count, message *why)
 {
     const char *at = text;
@@ -34,7 +34,7 @@ static bool numbers(const char *option, const char *text, long low, long high, i
         if (*end == '\0')
             return true;
     }
-    return message_set(why, "%s %.80s: give one to %d numbers from %ld to %ld with commas between", option,
+    return message_set(why, "%s %.80s: give one to %d numbers from %ld to %ld with commas between", name,
                        text, BENCH_TURNS, low, high);
 }
 
