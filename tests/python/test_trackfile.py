@@ -221,6 +221,12 @@ def test_damaged_tracks_are_reported(change, words, tmp_path):
         read_track(tmp_path / "t.csv")
 
 
+def test_more_than_a_million_particles_can_be_read_back(tmp_path):
+    with TrackWriter(tmp_path / "t.csv", 5, MODEL.joint_names, MODEL.angle_names) as rows:
+        rows.write(Frame(0, 0.0, None), replace(estimate(0), ess=float(1 << 20)))
+    assert read_track(tmp_path / "t.csv").numbers["ess"] == [1 << 20]
+
+
 def test_a_negative_sd_is_named(tmp_path):
     write(tmp_path / "t.csv")
 

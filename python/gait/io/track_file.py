@@ -45,8 +45,9 @@ WHOLE_COLUMNS = ("frame", *CLIP_COLUMNS[1:], PERSON_COLUMN)
 CAMERA_COLUMNS = tuple(f"camera_{k}_{what}" for k in range(1, 5) for what in ("x", "y", "heading"))
 
 
-#: Columns that may have any finite number, such as times since 1970; others are at most `LARGEST`.
-_UNBOUNDED = ("frame", "time", "log_evidence", *CLIP_COLUMNS, PERSON_COLUMN)
+#: Columns that may have any finite number, such as times since 1970, or the effective number of more than a
+#: million particles; others are at most `LARGEST`.
+_UNBOUNDED = ("frame", "time", "ess", "log_evidence", *CLIP_COLUMNS, PERSON_COLUMN)
 LARGEST = 1e6
 """Largest magnitude of other numbers in a track, in metres or another unit."""
 _NOT_NEGATIVE = re.compile(r"stature_m|ess|.*_sd(_rad|_m)?|.*_s[xyz]")
