@@ -125,9 +125,7 @@ def test_start_and_stop_choose_the_rows(scene, capsys):
 
 def test_a_film_that_breaks_off_is_a_warning(scene, capsys, monkeypatch):
     class Cut(Video):
-        def __init__(self, path):
-            super().__init__(path)
-            self.broken = f"{path}: breaks off"
+        broken = property(lambda self: f"{self.path}: breaks off")
 
     monkeypatch.setattr("gait.track.read_scene.Video", Cut)
     assert track(scene, "--stop", 3) == 0

@@ -187,13 +187,7 @@ class _Film(Video):
     """Frames without a file."""
 
     def __init__(self, times):
-        self.path, self.fps, self.count, self.times, self.broken = (
-            None,
-            1 / np.diff(times).mean(),
-            len(times),
-            times,
-            None,
-        )
+        self.path, self.fps, self.count, self.times = None, 1 / np.diff(times).mean(), len(times), times
         self.width = self.height = 2
         self.digest = ""
 

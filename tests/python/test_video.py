@@ -2,6 +2,7 @@
 
 import errno
 import json
+import re
 import struct
 import wave
 from pathlib import Path
@@ -12,13 +13,17 @@ import numpy as np
 import pytest
 from drawn_person import clip, wall, write
 
+import gait.cli
 from gait import Model, UserError, Video, VideoWriter, background
 from gait.bindings.model import read_blob
 from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
 from gait.io import blob
 from gait.io.video import median_plate
-from gait.lift.video.run import Request, lift_video
+from gait.lift.video.run import Request, lift_video, open_clip
 from gait.report.film import Films
+from gait.track.further_cameras import SeveralVideos
+from gait.track.moving_video import MovingVideo
 
 FAULTS = Path(__file__).resolve().parents[2] / "../shared/data/faults"
 
@@ -155,6 +160,61 @@ def test_a_film_that_breaks_off_names_the_last_frame(suffix, film, tmp_path):
     cut.write_bytes(whole.read_bytes()[:ninth])
     assert Video(whole).broken is None
     assert f"cut.{suffix}: breaks off after frame 8 of 12" in Video(cut).broken
+
+
+def spoil(film, path, monkeypatch):
+    """Write a film that states frames which it lacks, and of which the decoder calls the third damaged."""
+    whole = path.with_suffix(".whole.mp4")
+    with av.open(str(film)) as source, av.open(str(whole), "w", options={"movflags": "faststart"}) as target:
+        stream = target.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(video=0):
+            packet.stream = stream
+            if packet.dts is not None:
+                target.mux(packet)
+    with av.open(str(whole)) as container:
+        ninth = [packet.pos for packet in container.demux(video=0) if packet.size][8]
+    path.write_bytes(whole.read_bytes()[:ninth])
+    decode = Video._decode
+
+    def spoilt(self, stop):
+        for index, time, frame in decode(self, stop):
+            if index == 2:
+                self._damaged.add(index)
+            yield index, time, frame
+
+    monkeypatch.setattr(Video, "_decode", spoilt)
+
+
+def test_damage_is_reported_beside_a_missing_end_by_all_kinds_of_films(film, tmp_path, monkeypatch):
+    spoil(film, tmp_path / "bad.mp4", monkeypatch)
+    camera = Camera.looking((0.0, -4.0, 1.0), (0.0, 0.0, 1.0), (64, 48), 60.0)
+    for wrap in (
+        lambda video: video,
+        lambda video: MovingVideo(video, camera, dict.fromkeys(range(12))),
+        lambda video: SeveralVideos(video, [Video(film)], [0.0]),
+        lambda video: SeveralVideos(Video(film), [video], [0.0]),
+    ):
+        video = wrap(Video(tmp_path / "bad.mp4"))
+        assert "bad.mp4: breaks off after frame 8 of 12; copy it again" in video.broken
+        assert len(list(video.frames())) >= 7
+        words = r"bad.mp4: breaks off after frame 8 of 12; frames are damaged: 1, first 2; copy it again"
+        assert re.search(words, video.broken)
+
+
+def test_detect_reports_damage_that_the_detector_met(film, tmp_path, monkeypatch, capsys):
+    spoil(film, tmp_path / "bad.mp4", monkeypatch)
+    monkeypatch.setattr("gait.detect.people.detect", lambda video, *_, **__: dict(enumerate(video.frames(9))))
+    assert gait.cli.main(["detect", str(tmp_path / "bad.mp4"), "-o", str(tmp_path / "k.csv")]) == 1
+    assert re.match("warning: .*frames are damaged: 1, first 2; ", capsys.readouterr().err)
+
+
+def test_lifting_reports_damage_that_the_sensors_met(film, tmp_path, monkeypatch):
+    spoil(film, tmp_path / "bad.mp4", monkeypatch)
+    (tmp_path / "p.json").write_text(json.dumps(PLACED))
+    warned = []
+    request = Request(str(tmp_path / "bad.mp4"), str(tmp_path / "p.json"), background="none", start=0)
+    open_clip(request, SegmentPrior.load(), warned.append, quiet=True)
+    assert len(warned) == 1 and "frames are damaged: 1, first 2; " in warned[0]
 
 
 def test_missing_video(tmp_path):

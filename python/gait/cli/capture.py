@@ -274,8 +274,8 @@ def _report(
 ) -> None:
     from gait.lcm.capture import DeviceSource
 
-    broken = None if isinstance(source, DeviceSource) else source.video.broken
-    warning(broken or "", args.quiet or not broken)
+    if not isinstance(source, DeviceSource) and (broken := source.video.broken):
+        warning(broken, args.quiet)
     late = round(pacer.late * 1000, 2)
     if args.json:
         print(json.dumps({"frames": publisher.sent, "late_ms": late}))

@@ -21,7 +21,7 @@ from gait.cli import values
 from gait.detect import weights
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
-from gait.progress import note, progress
+from gait.progress import note, progress, warning
 from gait.signals import Interruptible
 
 _TURN = 0.1  # seconds that a call waits for a message
@@ -91,7 +91,7 @@ def _live(args: argparse.Namespace) -> int:
 def run(args: argparse.Namespace) -> int:
     """Download the weights, detect live, or detect in a video and write the keypoints."""
     from gait.io.keypoints_file import write
-    from gait.io.video import Video
+    from gait.io.video import Video, reporting_damage
 
     if args.fetch:
         folder = weights.fetch(partial(note, quiet=args.quiet))
@@ -110,8 +110,8 @@ def run(args: argparse.Namespace) -> int:
 
     video = Video(args.video)
     require_length(video, range(video.count))
-    note(video.broken or "", args.quiet or not video.broken)
-    with progress("detecting", video.count, args.quiet) as update:
+    warn = partial(warning, quiet=args.quiet)
+    with reporting_damage(video, warn), progress("detecting", video.count, args.quiet) as update:
         people = detect(video, args.network, args.people, update=update)
     require_person(people, video)
     chosen = main_person(people) if args.person is None else args.person

@@ -9,7 +9,7 @@ import hashlib
 import os
 import platform
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from fractions import Fraction
 from pathlib import Path
 from threading import Thread
@@ -84,9 +84,6 @@ class Video:
         unreadable because of damage.
     times : ndarray of shape (count,)
         Presentation times, seconds since the first frame, from the file's index.
-    broken : str or None
-        A description, if the file ends before the last of the frames that it states, or a decoded frame was
-        damaged.
     digest : str
         Hash of the sizes of the coded pictures: the same for copies in other containers, but not for other
         films.
@@ -101,6 +98,7 @@ class Video:
         import av
 
         self.path = Path(path)
+        self._cut = ""  # where the file ends before the last of the frames that it states
         self._damaged: set[int] = set()  # frames, of those decoded so far
         require_file(self.path, "video file")
         try:
@@ -112,6 +110,17 @@ class Video:
     def size(self) -> tuple[int, int]:
         """Width and height in pixels."""
         return self.width, self.height
+
+    @property
+    def broken(self) -> str | None:
+        """A description, if the file ends before the frames that it states, or a decoded frame was damaged.
+
+        It is complete only after the frames have been decoded.
+        """
+        found = [self._cut] if self._cut else []
+        if self._damaged:
+            found.append(f"frames are damaged: {len(self._damaged)}, first {min(self._damaged)}")
+        return f"{self.path}: {'; '.join(found)}; copy it again if you need all frames" if found else None
 
     def span(self, start: int, stop: int | None) -> range:
         """Return the numbers of the frames start <= number < stop; UserError if there are none."""
@@ -164,10 +173,8 @@ class Video:
             stated, more = stream.frames, 0
             if not stated and container.duration and len(container.streams) == 1:  # sound may be longer
                 stated, more = round(container.duration * 1e-6 * self.fps), _END
-            self.broken: str | None = None
             if len(packets) + more < stated:
-                found = f"breaks off after frame {self.count} of {stated}"
-                self.broken = f"{self.path}: {found}; copy it again if you need the rest"
+                self._cut = f"breaks off after frame {self.count} of {stated}"
         for _, _, frame in self._decode(1):
             self.height, self.width = self._upright(_converter()(frame, format="gray")).shape
             return
@@ -192,16 +199,10 @@ class Video:
                         time = last + 1 / self.fps
                     last = time
                     if frame.is_corrupt:
-                        self._note_damage(index)
+                        self._damaged.add(index)
                     yield index, time, frame
         except av.error.FFmpegError as exc:
             raise self._unreadable(exc) from exc
-
-    def _note_damage(self, index: int) -> None:
-        """Add a damaged frame to `broken`, once however often it is decoded."""
-        self._damaged.add(index)
-        found = f"frames are damaged: {len(self._damaged)}, first {min(self._damaged)}"
-        self.broken = f"{self.path}: {found}; copy it again if you need them"
 
     def _upright(self, frame: av.VideoFrame) -> Image:
         """Return a frame's pixels, rotated and mirrored as the container states."""
@@ -229,6 +230,16 @@ class Video:
     def _unreadable(self, exc: av.error.FFmpegError) -> UserError:
         reason = exc.strerror or type(exc).__name__
         return UserError(f"{self.path}: cannot be read as video ({reason}); give a file that ffmpeg plays")
+
+
+@contextmanager
+def reporting_damage(video: Video, warn: Callable[[str], None]) -> Iterator[None]:
+    """Call `warn` with `Video.broken`, if there is any, after a block that decodes the film."""
+    try:
+        yield
+    finally:
+        if broken := video.broken:
+            warn(broken)
 
 
 def _converter() -> Callable[..., av.VideoFrame]:

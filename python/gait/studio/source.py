@@ -114,8 +114,6 @@ def open_source(wanted: Wanted, video: Video, folder: Path, warn: Warn, quiet: b
     camera = Camera.read(wanted.camera, video.size, wanted.scale_camera) if wanted.camera else None
     if camera is not None and wanted.camera is not None:
         camera.check_place(wanted.camera)
-    if video.broken and (wanted.keypoints or wanted.track):  # other inputs cause the warning later
-        warn(video.broken)
     prior = lift_run.load_prior(wanted.model, warn)
     lift: Lift
     if wanted.placement:
@@ -123,6 +121,8 @@ def open_source(wanted: Wanted, video: Video, folder: Path, warn: Warn, quiet: b
     else:
         lift = _keypoint_lift(wanted, video, camera, folder, prior, warn, quiet)
     film = _kept(folder / "film.mp4", video, lambda target: _write_film(target, video, quiet))
+    if video.broken and (wanted.keypoints or wanted.track):  # other inputs have caused the warning
+        warn(video.broken)
     corrections = Path(wanted.corrections) if wanted.corrections else folder / "corrections.json"
     words = ["--camera", shlex.quote(wanted.camera)] if wanted.camera else []
     words += ["--scale-camera"] if wanted.scale_camera else []

@@ -36,7 +36,7 @@ class SeveralVideos(Video):
 
     def __init__(self, video: Video, others: Sequence[Video], offsets: Sequence[float]) -> None:
         self.path, self.fps, self.count, self.times = video.path, video.fps, video.count, video.times
-        self.broken, self.digest = video.broken, video.digest
+        self.digest = video.digest
         self.width, self.height = video.size
         self._video, self._others = video, others
         self._partners = [
@@ -45,6 +45,11 @@ class SeveralVideos(Video):
         for other, offset, partners in zip(others, offsets, self._partners, strict=True):
             if not (partners >= 0).any():
                 raise no_shared_frame(str(other.path), str(video.path), offset, float(video.times[-1]))
+
+    @property
+    def broken(self) -> str | None:
+        """As in `Video`, for all films."""
+        return "; ".join(one.broken for one in (self._video, *self._others) if one.broken) or None
 
     def frames(self, start: int = 0, stop: int | None = None, *, grey: bool = False) -> Iterator[Frame]:
         """Yield the frames `start` <= index < `stop` in order, as BGR or grey."""

@@ -96,9 +96,14 @@ class MovingVideo(Video):
         self, video: Video, lens: Camera, poses: Mapping[int, CameraPose], panorama: Panorama | None = None
     ) -> None:
         self.path, self.fps, self.count, self.times = video.path, video.fps, video.count, video.times
-        self.broken, self.digest = video.broken, video.digest
+        self.digest = video.digest
         self.width, self.height = video.size
         self._video, self._lens, self.poses, self.panorama = video, lens, poses, panorama
+
+    @property
+    def broken(self) -> str | None:
+        """As in `Video`."""
+        return self._video.broken
 
     def without_panorama(self) -> MovingVideo:
         """Return the same clip without the empty scene."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 from gait.bindings.abi import Mode
 from gait.bindings.model import Model
 from gait.body.measured import model_of
-from gait.io.video import Video, background
+from gait.io.video import Video, background, reporting_damage
 from gait.progress import progress, warning
 from gait.track.camera_check import contradiction
 from gait.track.clip_background import require_background, sample
@@ -41,7 +42,6 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
         If a file cannot be read or does not fit the others.
     """
     video = Video(options.video)
-    warning(video.broken or "", options.quiet or not video.broken)
     frames = video.span(options.start or 0, options.stop)
     camera, poses = given_camera(options, video, frames)
     name = options.model or ("paper" if options.mode == Mode.PAPER else "walk")
@@ -54,7 +54,8 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
     if given is not None:
         require_background(options, video, camera, model, given, first)
     empty = None
-    with ThreadPoolExecutor(1) as pool:
+    warn = partial(warning, quiet=options.quiet)
+    with reporting_damage(video, warn), ThreadPoolExecutor(1) as pool:
         if detects(options):
             # Another core computes the median of the clip while the detector runs.
             beside = pool.submit(sample, options, video, poses)

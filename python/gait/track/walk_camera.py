@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 from gait.bindings.model import Model
 from gait.camera.camera import Camera
@@ -10,7 +11,7 @@ from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.lens_tag import equivalent_mm, lens_tag, view_across
-from gait.io.video import Video
+from gait.io.video import Video, reporting_damage
 from gait.progress import note, progress, warning
 from gait.track.from_walk import Calibration, calibrate
 from gait.track.walk_start import GIVEN_FOV_SD, usual_camera
@@ -32,8 +33,8 @@ def find_people(video: Video, quiet: bool, first: int = 0, stop: int | None = No
 
     frames = video.span(first, stop)
     require_length(video, frames)
-    warning(video.broken or "", quiet or not video.broken)
-    with progress("detecting", len(frames), quiet) as update:
+    warn = partial(warning, quiet=quiet)
+    with reporting_damage(video, warn), progress("detecting", len(frames), quiet) as update:
         people = detect(video, first=first, stop=stop, update=update)
     require_person(people, video)
     return {id: keypoints_file.as_filed(people[id]) for id in by_size(people)}

@@ -16,7 +16,7 @@ from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.blob import decode
-from gait.io.video import Video, background
+from gait.io.video import Video, background, reporting_damage
 from gait.lift.keypoints.corrections import Correction, read_corrections
 from gait.lift.video.clip_segments import ClipSegments, Settings
 from gait.lift.video.figure import Figure, write_overlay
@@ -116,8 +116,6 @@ def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -
 def open_clip(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -> tuple[Video, ClipSegments]:
     """Read the files and compute the sensors, as `lift_video` does before it estimates."""
     video = Video(request.video)
-    if video.broken:
-        warn(video.broken)
     camera = Camera.read(request.camera, video.size, request.scale_camera) if request.camera else None
     placement = read_placement(request.placement, prior, camera is not None)
     if request.calibration is not None:
@@ -131,7 +129,8 @@ def open_clip(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) ->
     if request.corrections:
         corrections = read_corrections(request.corrections, prior, stop, first, video.size)
     view = CameraView(camera) if camera else _flat(placement, prior)
-    film = _film(request, video, view, placement, prior, (first, stop), quiet)
+    with reporting_damage(video, warn):
+        film = _film(request, video, view, placement, prior, (first, stop), quiet)
     used = [c for c in corrections if first <= c.frame < first + len(film.times)]
     if len(used) < len(corrections):
         warn(f"{len(corrections) - len(used)} corrections are in frames that are not used")
