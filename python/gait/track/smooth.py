@@ -47,7 +47,7 @@ _SIZE_SD = 0.01  # relative sd of the size that pictures determine at best, as i
 _LASTING_PHASE, _ONE_PHASE = 0.3, 0.05
 #: Least weight of the dominant hypothesis with status `tracking`: DOMINANT_WEIGHT of estimate.h.
 _DOMINANT_WEIGHT = 0.7
-_CHECKED_S = 0.7  # seconds before a frame that its checks average over at least: AVERAGE_TIME of fit_check.c
+_CHECKED_S = 0.7  # seconds before a frame on which its checks rest: AVERAGE_TIME of fit_check.c
 
 
 class Spool:
@@ -354,7 +354,7 @@ class Smoother:
 
 
 def with_later_checks(filtered: Sequence[tuple[Frame, Estimate]]) -> list[tuple[Frame, Estimate]]:
-    """Flag also the estimates before one that other bodies fit, as its checks are averages over these frames.
+    """Flag also the estimates before one that other bodies fit, as its checks rest on these frames.
 
     Parameters
     ----------
