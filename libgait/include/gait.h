@@ -124,7 +124,7 @@ typedef struct gait_image { GAIT_IMAGE_FIELDS(GAIT_DECLARE) } gait_image;
           float, R, [9], "")                                                                                          \
     FIELD("World origin in camera coordinates, each within 1e4.",                                                     \
           float, t, [3], "metres")                                                                                    \
-    FIELD("Lens distortion k1 k2 p1 p2 k3 as in OpenCV; it is applied to images as captured.",                        \
+    FIELD("Lens distortion k1 k2 p1 p2 k3 as in OpenCV, each within 1e3; images are as captured.",                        \
           float, distortion, [5], "")
 
 typedef struct gait_camera { GAIT_CAMERA_FIELDS(GAIT_DECLARE) } gait_camera;
@@ -437,7 +437,7 @@ typedef GAIT_ENUM(gait_track_status) {
 #define GAIT_EST_NO_IMAGE   0x2u /* prediction only */
 #define GAIT_EST_DEGENERATE 0x4u /* effective sample size below 2 */
 #define GAIT_EST_UNSUPPORTED 0x8u /* the images do not show a person at the estimate */
-#define GAIT_EST_OTHERS_FIT  0x10u /* a different body fits as well, in the mean over 0.7 s: turned, or in another phase */
+#define GAIT_EST_OTHERS_FIT  0x10u /* over the last frames a different body fits as well: turned, or in another phase */
 
 /* Estimate after a frame. */
 #define GAIT_ESTIMATE_FIELDS(FIELD)                                                                                   \
