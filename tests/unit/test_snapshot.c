@@ -186,6 +186,9 @@ static void test_implausible(gait_tracker *t)
     SPOIL(c->below_capacity, int32_t, -1, t->capacity);
     SPOIL(c->below_config, int32_t, -1, t->config_particles);
     SPOIL(h->stage, int32_t, HYPOTHESES_ONE - 1, HYPOTHESES_TWO + 1);
+    SPOIL(h->left_right_known, int32_t, -1, 2);
+    SPOIL(h->phase_known, int32_t, -1, 2);
+    SPOIL(h->agreed, int32_t, -1, 2);
     SPOIL(h->since, int64_t, INT64_MIN, now + 1);
     SPOIL(h->log_odds, double, NOT_FINITE);
     SPOIL(h->recent_log_ratio, double, NOT_FINITE);
@@ -197,7 +200,7 @@ static void test_implausible(gait_tracker *t)
     SPOIL(c->usual_unexplained, float, NAN, -1.0f, 2e9f);
     SPOIL(c->stature_sd_ratio, float, NAN, INFINITY, -0.1f);
     SPOIL(c->front_back_margin, float, NOT_FINITE);
-    SPOIL(c->left_right_margin, float, NOT_FINITE);
+    SPOIL(c->left_right_margin, float, NOT_FINITE, 4.6f, -4.6f);
     SPOIL(c->fit_margin, float, NOT_FINITE);
     SPOIL(c->map[0].scale, float, NAN, -1.0f, 3.0f);
     SPOIL(c->map[0].u0, float, TOO_LARGE);

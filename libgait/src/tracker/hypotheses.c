@@ -11,9 +11,8 @@ static const float ACQUISITION_TIME = 0.5f; /* seconds until the phase is known 
 static const float REFIT_TIME = 0.4f;
 static const float AGREED = 0.9f; /* weight of the dominant hypothesis from which those of a start agree */
 static const float JITTER_SCORE = 0.5f, JITTER_HEADING = 0.1f, JITTER_RATE = 0.02f,
-                   JITTER_PHASE = 0.05f; /* sd */
-/* Log odds from which left and right are reported as known (probability 0.99), and the other hypothesis is dropped. */
-static const double REPORT_LOG_ODDS = 4.5, MERGE_LOG_ODDS = 9.0;
+                   JITTER_PHASE = 0.05f;  /* sd */
+static const double MERGE_LOG_ODDS = 9.0; /* from which the other hypothesis is dropped */
 /* Effective sample size that remains after each frame of acquisition, as a share of the particles: with known phase, and
  * without, where particles that agree on a body too soon leave left and right to chance. */
 static const double KNOWN_ESS = 0.2, UNKNOWN_ESS = 0.4;
@@ -81,10 +80,10 @@ bool hypotheses_prove(gait_tracker *t, float dt, float nats)
     return h->log_odds >= 0.0;
 }
 
-void hypotheses_agree(gait_tracker *t, float weight)
+void hypotheses_record_agreement(gait_tracker *t, float weight)
 {
     hypotheses_state *const h = &t->core->hypotheses;
-    h->agreed |= h->stage == HYPOTHESES_ACQUISITION && h->phase_known && weight >= AGREED;
+    h->agreed = h->stage == HYPOTHESES_ACQUISITION && h->phase_known && weight >= AGREED;
 }
 
 /* The person is to be found first. */
@@ -101,7 +100,7 @@ bool hypotheses_open(const gait_tracker *t)
 {
     const hypotheses_state *const h = &t->core->hypotheses;
     return h->stage == HYPOTHESES_ACQUISITION ||
-           (h->stage == HYPOTHESES_TWO && fabs(h->log_odds) < REPORT_LOG_ODDS);
+           (h->stage == HYPOTHESES_TWO && fabs(h->log_odds) < (double)REPORT_LOG_ODDS);
 }
 
 bool hypotheses_acquiring(const gait_tracker *t)

@@ -17,6 +17,8 @@
 #define GAIT_TRACKER_HYPOTHESES_H
 #include "tracker/tracker_state.h"
 
+#define REPORT_LOG_ODDS 4.5f /* from which left and right are reported as known (probability 0.99) */
+
 /* The phase is open: begin acquisition (in paper mode there is only one hypothesis). */
 void hypotheses_acquire(gait_tracker *t);
 
@@ -39,9 +41,9 @@ void hypotheses_drop(gait_tracker *t);
 bool hypotheses_decided(const gait_tracker *t);
 void hypotheses_merge(gait_tracker *t);
 
-/* End acquisition, if phases are known but for the side, once the hypotheses of a start agree.  weight: of the dominant
- * hypothesis. */
-void hypotheses_agree(gait_tracker *t, float weight);
+/* Record whether the hypotheses of a start with known phases agree in this frame, which ends acquisition once a person is
+ * proven.  weight: of the dominant hypothesis. */
+void hypotheses_record_agreement(gait_tracker *t, float weight);
 
 /* Whether acquisition has lasted long enough, or the person walks on after standing still; lay the particles out as two
  * hypotheses.  The weights must be even, as after resampling.  Clears the templates. */

@@ -3,20 +3,16 @@
 #include "tracker/hypotheses.h"
 #include "tracker/likelihood_step.h"
 
-/* Log odds when left and right become known (REPORT_LOG_ODDS of hypotheses.c), and at most, so that old evidence does not
- * outweigh new. */
-static const float MOST = 4.5f;
-
 float left_right_update(gait_tracker *t, bool restart, float dt, const state_layout *of,
                         const particle_state *mean)
 {
     float const before = t->core->left_right_margin;
     if (restart)
-        return MOST;
+        return REPORT_LOG_ODDS;
     if (!(t->cfg.terms & GAIT_TERM_KEYPOINTS) || of->model->direction == 0)
         return before;
     particle_state const mirrored = mirror_apply(&t->mirror[of->model->motion_class], of, mean);
     float const better = likelihood_of_keypoints(t, of, mean) - likelihood_of_keypoints(t, of, &mirrored);
     float const nats = hypotheses_evidence_share(t, dt) * t->cfg.keypoints_weight * better;
-    return f_clamp(before + nats, -MOST, MOST);
+    return f_clamp(before + nats, -REPORT_LOG_ODDS, REPORT_LOG_ODDS);
 }

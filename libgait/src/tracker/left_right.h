@@ -1,8 +1,9 @@
 /* left_right.h - check that the keypoints show the left leg where the estimate has it.
  *
  * Once left and right are known, only the keypoints compare the estimate with its mirror image, half a stride later.  The
- * odds begin with those at which left and right are reported as known.  A frame counts as in the odds between two
- * hypotheses: little if the detector may have swapped the sides, and less if the last frame is recent. */
+ * odds begin with those at which left and right are reported as known, and are never larger, so that old evidence does not
+ * outweigh new.  A frame counts as in the odds between two hypotheses: little if the detector may have swapped the sides,
+ * and less if the last frame is recent. */
 #ifndef GAIT_TRACKER_LEFT_RIGHT_H
 #define GAIT_TRACKER_LEFT_RIGHT_H
 #include "tracker/tracker_state.h"

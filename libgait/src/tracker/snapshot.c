@@ -1,6 +1,7 @@
 #include "tracker/snapshot.h"
 #include "base/fmath.h"
 #include "base/hash.h"
+#include "tracker/hypotheses.h"
 #include <string.h>
 
 typedef struct snapshot_header {
@@ -75,25 +76,31 @@ static bool moderate(const float *x, size_t n)
 /* Microseconds since the start that no tracker reaches: differences of times below it cannot overflow. */
 static const uint64_t LONGEST_AGE = 1ull << 62;
 
+static bool flag(int32_t x)
+{
+    return x == 0 || x == 1;
+}
+
 static bool core_plausible(const gait_tracker *t, const unsigned char *body)
 {
     tracker_core c;
     memcpy(&c, body, sizeof c);
-    bool ok = c.generation >= 0 && c.generation < t->history.depth && (c.started == 0 || c.started == 1);
+    bool ok = c.generation >= 0 && c.generation < t->history.depth && flag(c.started);
     ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->capacity && c.below_capacity >= 0 &&
           c.below_capacity < t->capacity;
     ok &= c.below_config >= 0 && c.below_config <= t->config_particles - 16;
     const hypotheses_state *const h = &c.hypotheses;
     ok &= h->stage >= HYPOTHESES_ONE && h->stage <= HYPOTHESES_TWO && h->since <= c.utime &&
           h->since >= c.start_utime;
+    ok &= flag(h->left_right_known) && flag(h->phase_known) && flag(h->agreed);
     ok &= fabs(h->log_odds) < 1e6 && fabs(h->recent_log_ratio) < 1e12; /* false for NaN */
     ok &= c.start_utime <= c.utime && (uint64_t)c.utime - (uint64_t)c.start_utime < LONGEST_AGE;
     ok &= c.frame < LONGEST_AGE && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
     ok &= c.rejuvenation_utime <= c.utime && c.rejuvenation_utime >= c.start_utime;
     ok &= c.usual_unexplained >= 0.0f && c.usual_unexplained < 1e9f && c.stature_sd_ratio >= 0.0f &&
           c.stature_sd_ratio < 1e9f;
-    ok &=
-        f_finite(&c.front_back_margin, 1) && f_finite(&c.left_right_margin, 1) && f_finite(&c.fit_margin, 1);
+    ok &= f_finite(&c.front_back_margin, 1) && f_finite(&c.fit_margin, 1);
+    ok &= fabsf(c.left_right_margin) <= REPORT_LOG_ODDS;
     for (int32_t k = 0; k < t->cfg.cameras; k++) {
         const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};
         ok &= moderate(map, 3) && map[0] >= 0.0f && map[0] <= 2.0f;

@@ -393,7 +393,7 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
         walk_check_update(t, &mean);
         check_estimate(t, dt, lost, &t->layouts[e.motion_class], &mean);
     }
-    hypotheses_agree(t, e.hypothesis_weight);
+    hypotheses_record_agreement(t, e.hypothesis_weight);
     bool const few = s.degenerate || s.ess < DEGENERATE_ESS; /* particles with weight */
     e.status = s.degenerate ? GAIT_TRACK_LOST : status_of(t, dt, &e);
     e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (has_image ? 0 : GAIT_EST_NO_IMAGE) |

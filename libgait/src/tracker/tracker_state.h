@@ -14,9 +14,10 @@
 enum { HYPOTHESES_ONE, HYPOTHESES_ACQUISITION, HYPOTHESES_TWO };
 typedef struct hypotheses_state {
     int32_t stage;
-    int32_t left_right_known;    /* left and right have been decided before */
-    int32_t phase_known, agreed; /* in acquisition: but for the side; the hypotheses of the start agree */
-    int64_t since;               /* when the stage began, microseconds */
+    int32_t left_right_known; /* left and right have been decided before */
+    int32_t phase_known;      /* in acquisition: the phase is known, but for the side */
+    int32_t agreed; /* in acquisition with known phases: those of the start agreed in the last frame */
+    int64_t since;  /* when the stage began, microseconds */
     /* Of the second hypothesis over the first (HYPOTHESES_TWO); before the images have proven an automatic start: of a
      * person over no person, at most 0. */
     double log_odds;
