@@ -1,19 +1,5 @@
 #include "filter/mirror.h"
 #include "base/fmath.h"
-#include <string.h>
-
-/* The channel of the same name on the other side; the channel itself if it has no side. */
-static int32_t partner_of(const gait_model *m, int32_t channel)
-{
-    const char *const name = m->channel_name[channel];
-    if ((name[0] != 'l' && name[0] != 'r') || name[1] != '_')
-        return channel;
-    for (int32_t k = 0; k < m->channels; k++)
-        if (m->channel_name[k][0] == (name[0] == 'l' ? 'r' : 'l') &&
-            strncmp(m->channel_name[k] + 1, name + 1, MODEL_NAME - 1) == 0)
-            return k;
-    return channel;
-}
 
 /* Signed axis (1 x, 2 y, 3 z) about which a channel rotates its frame; 0: none. */
 static int32_t axis_of(const gait_model *m, int32_t channel)
@@ -66,7 +52,7 @@ void mirror_init(mirror *x, const state_layout *r)
     const gait_model *const m = r->model;
     x->components = r->curve_components;
     for (int32_t c = 0; c < m->channels; c++) {
-        x->partner[c] = partner_of(m, c);
+        x->partner[c] = model_other_side(m->channel_name, m->channels, c);
         x->sign[c] = mirror_sign(m, c, x->partner[c]);
     }
     for (int32_t i = 0; i < x->components; i++)

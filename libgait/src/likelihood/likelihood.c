@@ -79,17 +79,18 @@ static void costs_init(like_setup *s)
     }
 }
 
-/* Parts and pairs of joints, by names such as l_knee and r_knee. */
+static bool of_arm(const char *joint)
+{
+    return !strcmp(joint, "shoulder") || !strcmp(joint, "elbow") || !strcmp(joint, "wrist");
+}
+
+/* Parts and pairs of joints.  Those that have a side and are not of an arm count as legs. */
 static COLD void sides_init(like_setup *s, const gait_model *m)
 {
     for (int32_t p = 0; p < m->points; p++) {
-        const char *const name = m->point_name[p];
-        int32_t q = 0;
-        while (q < m->points && (q == p || strcmp(m->point_name[q] + 1, name + 1) != 0))
-            q++;
-        bool const arm = name[2] == 's' || name[2] == 'e' || name[2] == 'w'; /* shoulder, elbow, wrist */
-        s->opposite[p] = (uint8_t)(q < m->points ? q : p);
-        s->part[p] = q == m->points ? LIKE_MIDDLE : arm ? LIKE_ARMS : LIKE_LEGS;
+        int32_t const q = model_other_side(m->point_name, m->points, p);
+        s->opposite[p] = (uint8_t)q;
+        s->part[p] = q == p ? LIKE_MIDDLE : of_arm(m->point_name[p] + 2) ? LIKE_ARMS : LIKE_LEGS;
     }
 }
 

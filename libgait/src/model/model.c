@@ -320,6 +320,17 @@ int32_t model_find_angle(const gait_model *m, const char *name, size_t length)
     return -1;
 }
 
+int32_t model_other_side(const char (*name)[MODEL_NAME], int32_t names, int32_t i)
+{
+    char const side = name[i][0];
+    if ((side != 'l' && side != 'r') || name[i][1] != '_')
+        return i;
+    for (int32_t k = 0; k < names; k++)
+        if (name[k][0] == (side == 'l' ? 'r' : 'l') && strcmp(name[k] + 1, name[i] + 1) == 0)
+            return k;
+    return i;
+}
+
 uint32_t model_posture_angles(const gait_model *m)
 {
     static const char names[][20] = {

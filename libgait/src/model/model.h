@@ -90,6 +90,9 @@ gait_result model_need_cyclic(const gait_model *m, gait_error *err);
 /* Index of the angle whose name is the first `length` characters of `name`; -1: there is none. */
 int32_t model_find_angle(const gait_model *m, const char *name, size_t length);
 
+/* Index of the name for the same part of the other side, such as r_knee for l_knee; i itself if there is none. */
+int32_t model_other_side(const char (*name)[MODEL_NAME], int32_t names, int32_t i);
+
 /* Mask of the angles of trunk and arms whose posture differs most between people. */
 uint32_t model_posture_angles(const gait_model *m);
 
