@@ -30,8 +30,7 @@ typedef enum option_result { OPTION_OK, OPTION_HELP, OPTION_BAD } option_result;
 /* Set values from argv[1..]. */
 option_result options_parse(const option *table, int count, int argc, char **argv, message *why);
 /* Set values from lines `name = value` of TOML, each name once: a string in plain quotes without escapes, true or false, a
- * decimal number without underscores; # starts a comment.  The
- * file may not set `config` and `version`. */
+ * decimal number without underscores; # starts a comment.  The file may not set `config` and `version`. */
 bool options_file(const option *table, int count, const char *path, message *why);
 /* One paragraph per option to stdout. */
 void options_help(const option *table, int count);
