@@ -55,6 +55,30 @@ def test_an_unfinished_log_that_is_played_is_not_overwritten(tmp_path):
     assert source.read_bytes() == before
 
 
+def test_an_unfinished_log_of_a_daemon_that_was_killed_is_kept(tmp_path):
+    source, out = log(tmp_path), tmp_path / "out.log"
+    for number in (2, 3):
+        (tmp_path / "out.unfinished.log").write_text(f"before {number}")
+        one_line(
+            run(source, f"file://{out}?mode=w"),
+            0,
+            f"{out}: ",
+            f"is now in {out.stem}.unfinished-{number}.log",
+        )
+        assert (tmp_path / f"out.unfinished-{number}.log").read_text() == f"before {number}"
+    assert {path.name for path in tmp_path.glob("*.unfinished.*")} == set()
+
+
+def test_the_target_of_a_link_with_the_name_of_an_unfinished_log_stays(tmp_path):
+    precious = tmp_path / "precious"
+    precious.write_text("keep")
+    (tmp_path / "out.unfinished.log").symlink_to(precious)
+    one_line(
+        run(log(tmp_path), f"file://{tmp_path}/out.log?mode=w"), 1, "out.unfinished.log is not a regular file"
+    )
+    assert precious.read_text() == "keep" and not (tmp_path / "out.log").exists()
+
+
 def test_a_daemon_that_cannot_start_leaves_the_old_log(tmp_path):
     out = log(tmp_path, name="out.log")
     before = out.read_bytes()

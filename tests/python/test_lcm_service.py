@@ -14,7 +14,7 @@ from queue import SimpleQueue
 import lcm_rig as rig
 import pytest
 
-from gait.lcm.link import private_url
+from gait.lcm.link import gaitmsg, private_url
 from gait.lcm.messages import camera_message
 
 COUNT, KILLED = 10, 6
@@ -246,6 +246,33 @@ def test_a_stop_during_a_reload_is_not_lost(tmp_path, manager):
                 assert daemon.wait(rig.PATIENCE) == 0 and b"frames 0 " in summary.read()
         finally:
             daemon.kill()
+
+
+@pytest.mark.parametrize("mode", ["w", "a"])
+def test_the_log_in_use_can_be_kept_in_a_reload(tmp_path, manager, mode):
+    """By any of its names: a new one begins, or it continues.  Each part has the status at its end."""
+    config, out, link = (tmp_path / name for name in ("trackd.toml", "out.log", "link.log"))
+    link.symlink_to(out)
+    config.write_text(f'out = "file://{out}?mode={mode}"\n')
+    with subprocess.Popen(rig.command("--url", private_url(), "--config", config)) as daemon:
+        try:
+            assert manager() == "READY=1"
+            parts = []
+            for name in (f"{tmp_path}/./out.log", link, out):
+                config.write_text(f'out = "file://{name}?mode={mode}"\n')
+                daemon.send_signal(signal.SIGHUP)
+                assert manager() == "RELOADING=1" and manager() == "READY=1"
+                parts.append(out.stat())
+            daemon.terminate()
+            assert manager() == "STOPPING=1" and daemon.wait(rig.PATIENCE) == 0
+            parts.append(out.stat())
+        finally:
+            daemon.kill()
+    assert len({part.st_ino for part in parts}) == 1 or mode == "w"
+    sizes = [part.st_size for part in parts]
+    assert min(sizes) > 0 and (mode == "w" or sizes == sorted(set(sizes)))
+    assert len(rig.read_log(out, "GAIT_STATUS", gaitmsg.status_t)) >= (len(parts) if mode == "a" else 1)
+    assert not list(tmp_path.glob("*.unfinished*"))
 
 
 @pytest.mark.parametrize("words", [["--url", "nonsense://"], ["--particles", "many"]])

@@ -2,9 +2,12 @@
 #define _XOPEN_SOURCE 700 /* setenv */
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "../../tools/trackd/lcm_link.h"
@@ -13,6 +16,8 @@
 static struct layer {
     bool no_lcm, no_subscription, no_dup, no_null; /* which call fails */
     int publish, fsync;                            /* result; errno */
+    const char *denied;                            /* cannot be opened */
+    const char *swapped;                           /* is a link to this file when LCM opens a log */
     int subscribed, destroyed, capacity;           /* number of calls; last capacity */
 } layer;
 
@@ -54,7 +59,8 @@ static int layer_dup(int file)
 
 static int layer_open(const char *path, int flags, ...)
 {
-    return layer.no_null ? -1 : open(path, flags, 0600);
+    errno = EACCES;
+    return layer.no_null || (layer.denied && strcmp(path, layer.denied) == 0) ? -1 : open(path, flags, 0600);
 }
 
 static int layer_fsync(int file)
@@ -63,16 +69,25 @@ static int layer_fsync(int file)
     return layer.fsync ? -1 : fsync(file);
 }
 
+static lcm_eventlog_t *layer_eventlog(const char *path, const char *mode)
+{
+    if (layer.swapped && (unlink(path) != 0 || symlink(layer.swapped, path) != 0))
+        return NULL;
+    return lcm_eventlog_create(path, mode);
+}
+
 #undef lcm_create
 #undef lcm_publish
 #undef lcm_subscribe
 #undef lcm_subscription_set_queue_capacity
 #undef lcm_destroy
+#undef lcm_eventlog_create
 #define lcm_create                          layer_create
 #define lcm_publish                         layer_publish
 #define lcm_subscribe                       layer_subscribe
 #define lcm_subscription_set_queue_capacity layer_capacity
 #define lcm_destroy                         layer_destroy
+#define lcm_eventlog_create                 layer_eventlog
 #define dup                                 layer_dup
 #define open                                layer_open
 #define fsync                               layer_fsync
@@ -213,9 +228,11 @@ static void test_names_beside(void)
                                            {"a/.log", "a/.log.unfinished"}};
     char beside[LINK_PATH];
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        name_beside(names[i][0], beside);
+        name_beside(names[i][0], 1, beside);
         CHECK(strcmp(beside, names[i][1]) == 0);
     }
+    name_beside("/a/b.log", 3, beside);
+    CHECK(strcmp(beside, "/a/b.unfinished-3.log") == 0);
 }
 
 static void test_log(void)
@@ -249,7 +266,7 @@ static void test_log(void)
         CHECK((access(beside, F_OK) == 0) == !fsyncs[i].fine && log_scan(name, &why) == 1);
     }
     layer.fsync = 0;
-    CHECK(sink_open(&s, url, &why));
+    CHECK(unlink(beside) == 0 && sink_open(&s, url, &why));
     sink_publish(&s, "A", 0, data, 9);
     sink_publish(&s, "A", 0, data, 9);
     message_set(&why, "the program failed");
@@ -260,6 +277,181 @@ static void test_log(void)
     unlink(beside);
     unlink(name);
     CHECK(sink_check(url, &s, &why) && access(name, F_OK) != 0 && access(beside, F_OK) != 0);
+}
+
+/* ---- files beside a log, in a folder of the test */
+static char folder[] = P_tmpdir "/gait_link_XXXXXX";
+enum { BUFFERS = 64 };
+
+/* The path of a name in the folder, in one of more buffers than a test needs. */
+static const char *in_folder(const char *name)
+{
+    static char paths[BUFFERS][96];
+    static int next;
+    char *const path = paths[next++ % BUFFERS];
+    snprintf(path, sizeof *paths, "%s/%s", folder, name);
+    return path;
+}
+
+static const char *log_url(const char *path, char mode)
+{
+    static char urls[BUFFERS][112];
+    static int next;
+    char *const url = urls[next++ % BUFFERS];
+    snprintf(url, sizeof *urls, "file://%s?mode=%c", path, mode);
+    return url;
+}
+
+static void put(const char *path, const char *text)
+{
+    FILE *const f = fopen(path, "wb");
+    CHECK(f && fputs(text, f) >= 0 && fclose(f) == 0);
+}
+
+static bool contains(const char *path, const char *text)
+{
+    char found[64] = {0};
+    FILE *const f = fopen(path, "rb");
+    bool const same = f && fread(found, 1, sizeof found - 1, f) == strlen(text) && strcmp(found, text) == 0;
+    if (f)
+        fclose(f);
+    return same;
+}
+
+static bool opens(const char *url)
+{
+    sink s;
+    why.text[0] = '\0';
+    return sink_open(&s, url, &why) && sink_close(&s, true, &why);
+}
+
+/* What was left unfinished is kept under the first free name, unless it is empty. */
+static void test_unfinished_is_kept(void)
+{
+    const char *const log = in_folder("a.log"), *const beside = in_folder("a.unfinished.log");
+    layer = (struct layer){0};
+    put(beside, "first");
+    CHECK(opens(log_url(log, 'w')) && contains(in_folder("a.unfinished-2.log"), "first"));
+    put(beside, "second");
+    CHECK(symlink("absent", in_folder("a.unfinished-3.log")) == 0);
+    CHECK(sink_check(log_url(log, 'w'), &(sink){0}, &why) && contains(beside, "second"));
+    CHECK(opens(log_url(log, 'a')) && contains(beside, "second"));
+    CHECK(opens(log_url(log, 'w')) && contains(in_folder("a.unfinished-4.log"), "second"));
+    CHECK(contains(in_folder("a.unfinished-2.log"), "first") && access(beside, F_OK) != 0);
+    put(beside, "");
+    CHECK(opens(log_url(log, 'w')) && access(beside, F_OK) != 0);
+    CHECK(access(in_folder("a.unfinished-5.log"), F_OK) != 0);
+    for (int i = 2; i < 5; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "a.unfinished-%d.log", i);
+        unlink(in_folder(name));
+    }
+    unlink(log);
+}
+
+/* Nothing is written through a link, or to a pipe, with the name of the unfinished file. */
+static void test_unfinished_is_a_file(void)
+{
+    const char *const log = in_folder("a.log"), *const beside = in_folder("a.unfinished.log");
+    const char *const precious = in_folder("precious");
+    layer = (struct layer){0};
+    put(precious, "keep");
+    for (int kind = 0; kind < 4; kind++) {
+        if (kind == 0)
+            CHECK(symlink(precious, beside) == 0);
+        else if (kind == 1)
+            CHECK(symlink(in_folder("absent"), beside) == 0);
+        else
+            CHECK((kind == 2 ? mkfifo(beside, 0600) : mkdir(beside, 0700)) == 0);
+        for (const char *mode = "wa"; *mode; mode++) {
+            CHECK(!opens(log_url(log, *mode)) &&
+                  strstr(why.text, "a.unfinished.log is not a regular file; remove it"));
+            CHECK(!sink_check(log_url(log, *mode), &(sink){0}, &why) &&
+                  strstr(why.text, "is not a regular file"));
+        }
+        CHECK(access(log, F_OK) != 0 && access(in_folder("absent"), F_OK) != 0);
+        CHECK(kind == 3 ? rmdir(beside) == 0 : unlink(beside) == 0);
+    }
+    CHECK(contains(precious, "keep"));
+    layer.swapped = precious;
+    CHECK(!opens(log_url(log, 'w')) && strstr(why.text, "was replaced while it was opened"));
+    layer.swapped = NULL;
+    CHECK(unlink(beside) == 0 && unlink(precious) == 0);
+}
+
+/* A log that may not be written is not replaced. */
+static void test_read_only(void)
+{
+    const char *const log = in_folder("a.log"), *const beside = in_folder("a.unfinished.log");
+    layer = (struct layer){.denied = log};
+    put(log, "old");
+    for (const char *mode = "wa"; *mode; mode++) {
+        CHECK(!opens(log_url(log, *mode)) && strstr(why.text, "a.log: is read-only; give another name"));
+        CHECK(!sink_check(log_url(log, *mode), &(sink){0}, &why) && strstr(why.text, "a.log: is read-only"));
+    }
+    CHECK(contains(log, "old") && access(beside, F_OK) != 0);
+    char words[128];
+    layer.denied = beside; /* cannot be made */
+    snprintf(words, sizeof words, "folder %s cannot be written; give another place", folder);
+    CHECK(!opens(log_url(log, 'w')) && strstr(why.text, words) && contains(log, "old"));
+    unlink(log);
+}
+
+/* A log is compared by what it is: a reload may name that in use in another way. */
+static void test_log_in_use(void)
+{
+    const char *const log = in_folder("a.log"), *const link = in_folder("link.log");
+    sink s;
+    layer = (struct layer){0};
+    CHECK(symlink("a.log", link) == 0);
+    for (int old = 0; old < 2; old++)
+        for (const char *mode = "wa"; *mode; mode++) {
+            if (old)
+                put(log, "");
+            CHECK(sink_open(&s, log_url(log, *mode), &why));
+            for (const char *next = "wa"; *next; next++) {
+                CHECK(sink_check(log_url(log, *next), &s, &why));
+                CHECK(sink_check(log_url(in_folder("./a.log"), *next), &s, &why));
+                CHECK(sink_check(log_url(link, *next), &s, &why));
+                CHECK(!sink_check(log_url(in_folder("./a.log"), *next), &(sink){0}, &why));
+            }
+            sink other;
+            CHECK(sink_open(&other, log_url(in_folder("b.log"), *mode), &why));
+            CHECK(!sink_check(log_url(in_folder("b.log"), 'w'), &s, &why) &&
+                  strstr(why.text, "another program"));
+            CHECK(sink_close(&other, true, &why) && sink_close(&s, true, &why));
+            CHECK(unlink(log) == 0 && unlink(in_folder("b.log")) == 0);
+        }
+    unlink(link);
+}
+
+/* A pipe takes a log by any name, and a check is not its reader's end. */
+static void test_pipe(void)
+{
+    const char *const fifo = in_folder("fifo");
+    char number[64], byte[256];
+    int ends[2];
+    layer = (struct layer){0};
+    for (const char *mode = "wa"; *mode; mode++) {
+        CHECK(pipe(ends) == 0);
+        snprintf(number, sizeof number, "/dev/fd/%d", ends[1]);
+        sink s;
+        CHECK(sink_check(log_url(number, *mode), &(sink){0}, &why));
+        CHECK(sink_open(&s, log_url(number, *mode), &why));
+        sink_publish(&s, "A", 0, data, 9);
+        CHECK(sink_close(&s, true, &why));
+        close(ends[1]);
+        CHECK(read(ends[0], byte, sizeof byte) == HEAD + 1 + 9 && read(ends[0], byte, 1) == 0);
+        close(ends[0]);
+    }
+    CHECK(mkfifo(fifo, 0600) == 0);
+    CHECK(sink_check(log_url(fifo, 'w'), &(sink){0}, &why)); /* without a reader */
+    int const reader = open(fifo, O_RDONLY | O_NONBLOCK);
+    struct pollfd ended = {.fd = reader, .events = POLLIN};
+    CHECK(sink_check(log_url(fifo, 'w'), &(sink){0}, &why));
+    CHECK(poll(&ended, 1, 0) == 0); /* no end of file */
+    close(reader);
+    unlink(fifo);
 }
 
 /* A full disk is noticed when a buffer is written, or at the end; after it nothing more is written. */
@@ -295,6 +487,13 @@ int main(void)
     test_lost_messages();
     test_names_beside();
     test_log();
+    CHECK(mkdtemp(folder) != NULL);
+    test_unfinished_is_kept();
+    test_unfinished_is_a_file();
+    test_read_only();
+    test_log_in_use();
+    test_pipe();
+    CHECK(rmdir(folder) == 0);
     test_full_disk();
     return CHECK_DONE();
 }

@@ -205,13 +205,17 @@ const char *link_channel(const char *channel, int person, char name[LINK_CHANNEL
 /* ---- output ---- */
 #define TAKEN "--out %.160s: another program is writing this log; give another name"
 
-/* Where a log is: what a chain of links points to, whether it is there or not. */
-static void follow(const char *path, char to[LINK_PATH])
+/* Where a log is: what a chain of links points to, whether it is there or not.  A device or a pipe keeps its name, as links
+ * of /proc to a pipe lead to no name.  Returns whether it is one of these, or a folder. */
+static bool follow(const char *path, char to[LINK_PATH])
 {
     enum { LINKS = 40 };
     char link[LINK_PATH], from[LINK_PATH];
+    struct stat is;
     ssize_t n;
     snprintf(to, LINK_PATH, "%s", path);
+    if (stat(path, &is) == 0 && !S_ISREG(is.st_mode))
+        return true;
     for (int i = 0; i < LINKS && (n = readlink(to, link, sizeof link - 1)) > 0; i++) {
         link[n] = '\0';
         memcpy(from, to, sizeof from);
@@ -219,47 +223,70 @@ static void follow(const char *path, char to[LINK_PATH])
         int const folder = link[0] != '/' && slash ? (int)(slash - from + 1) : 0;
         snprintf(to, LINK_PATH, "%.*s%.*s", folder, from, LINK_PATH - 1 - folder, link);
     }
+    return false;
 }
 
-/* NAME.unfinished.SUFFIX, as the commands call their files. */
-static void name_beside(const char *path, char beside[LINK_PATH])
+/* NAME.unfinished.SUFFIX, from number 2 on NAME.unfinished-2.SUFFIX, as the commands call their files. */
+static void name_beside(const char *path, int number, char beside[LINK_PATH])
 {
     const char *const slash = strrchr(path, '/'), *const name = slash ? slash + 1 : path;
     const char *const dot = strrchr(name, '.'), *const suffix = dot && dot > name ? dot : name + strlen(name);
-    enum { ADDED = sizeof ".unfinished" };
-    int const stem = suffix - path < LINK_PATH - ADDED ? (int)(suffix - path) : LINK_PATH - ADDED;
-    snprintf(beside, LINK_PATH, "%.*s.unfinished%.*s", stem, path, LINK_PATH - ADDED - stem, suffix);
+    char added[24];
+    int const more = snprintf(added, sizeof added, number > 1 ? ".unfinished-%d" : ".unfinished", number);
+    int const most = LINK_PATH - 1 - more, stem = suffix - path < most ? (int)(suffix - path) : most;
+    snprintf(beside, LINK_PATH, "%.*s%s%.*s", stem, path, added, most - stem, suffix);
 }
 
 void link_unfinished(const char *path, char beside[LINK_PATH])
 {
     char target[LINK_PATH];
-    follow(path, target);
-    name_beside(target, beside);
+    (void)follow(path, target);
+    name_beside(target, 1, beside);
 }
 
 /* Set the names of the log of this URL, and return its mode. */
 static char set_names(sink *s, const char *url, char path[LINK_PATH])
 {
-    struct stat is;
     char const mode = link_log(url, path);
-    follow(path, s->path);
-    name_beside(s->path, s->beside);
-    s->fresh = mode == 'w' && (stat(s->path, &is) != 0 || S_ISREG(is.st_mode)); /* not a device or a pipe */
+    bool const special = follow(path, s->path);
+    if (!special)
+        name_beside(s->path, 1, s->beside);
+    s->fresh = mode == 'w' && !special;
     return mode;
 }
 
-/* Open a log and lock it, before it is emptied; a kill releases the lock.  -1: it cannot be opened.  Only files are locked. */
-static int lock(const char *path, int flags, bool *taken)
+static bool is_same(const struct stat *a, const struct stat *b)
 {
-    struct stat is;
-    int const file = open(path, O_WRONLY | O_CLOEXEC | O_NONBLOCK | flags, 0666);
-    if (file < 0 || fstat(file, &is) != 0 || !S_ISREG(is.st_mode) || flock(file, LOCK_EX | LOCK_NB) == 0 ||
-        errno != EWOULDBLOCK)
-        return file;
-    close(file);
-    *taken = true;
-    return -1;
+    return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
+}
+
+static bool is_file(int file, const struct stat *is)
+{
+    struct stat open;
+    return file >= 0 && fstat(file, &open) == 0 && is_same(&open, is);
+}
+
+/* Open a log and lock it, before it is emptied; a kill releases the lock.  Devices and pipes are not locked, nor is what `own`
+ * has locked.  Returns 0 or an errno; EWOULDBLOCK: another program is writing it. */
+static int lock(int *file, const char *path, int flags, const sink *own)
+{
+    struct stat is, named;
+    int fault = 0;
+    *file = open(path, O_WRONLY | O_CLOEXEC | O_NONBLOCK | flags, 0666);
+    if (*file < 0)
+        return errno == EEXIST ? EWOULDBLOCK : errno; /* it was made meanwhile */
+    if (fstat(*file, &is) != 0 || !S_ISREG(is.st_mode))
+        fault = flags & O_NOFOLLOW ? ELOOP : 0;
+    else if (own && own->log && (is_file(own->lock, &is) || is_file(own->other, &is)))
+        return 0;
+    else if ((flock(*file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) || lstat(path, &named) != 0 ||
+             !is_same(&is, &named)) /* it was replaced or removed meanwhile */
+        fault = EWOULDBLOCK;
+    if (fault) {
+        close(*file);
+        *file = -1;
+    }
+    return fault;
 }
 
 static void unlock(const sink *s)
@@ -270,16 +297,71 @@ static void unlock(const sink *s)
         close(s->other);
 }
 
-/* Lock both names; `flags` are for that which is written.  Returns 0, an errno of that, or -1: another program writes. */
-static int lock_both(sink *s, int flags)
+/* Keep what a program that was killed has written, under the first free name.  Returns 0 or an errno. */
+static int set_aside(const sink *s)
 {
-    bool taken = false;
-    s->other = lock(s->fresh ? s->path : s->beside, 0, &taken);
-    s->lock = taken ? -1 : lock(s->fresh ? s->beside : s->path, flags, &taken);
-    int const fault = s->lock < 0 ? errno : 0;
-    if (taken)
+    enum { MOST = 1000 };
+    char kept[LINK_PATH];
+    struct stat is;
+    int file, number = 2;
+    int fault = lock(&file, s->beside, O_NOFOLLOW, NULL);
+    if (fault)
+        return fault == ENOENT ? 0 : fault;
+    do
+        name_beside(s->path, number, kept);
+    while (lstat(kept, &is) == 0 && ++number < MOST);
+    const char *const slash = strrchr(kept, '/');
+    if (fstat(file, &is) == 0 && is.st_size == 0)
+        fault = unlink(s->beside) != 0 ? errno : 0;
+    else if (number == MOST)
+        fault = EEXIST;
+    else if (rename(s->beside, kept) != 0)
+        fault = errno;
+    else
+        log_line("--out %.160s: an earlier log was not finished; it is now in %.80s", s->path,
+                 slash ? slash + 1 : kept);
+    close(file);
+    return fault;
+}
+
+/* Lock both names, and make the file to write if `make`; `at` is the name to which the result applies: 0 or an errno. */
+static int lock_both(sink *s, bool make, const sink *own, const char **at)
+{
+    int const only = s->beside[0] ? O_NOFOLLOW : 0; /* regular files, not links to them */
+    int fault = 0;
+    s->lock = s->other = -1;
+    *at = s->fresh ? s->path : s->beside;
+    if (only && (fault = lock(&s->other, *at, only, own)) == ENOENT)
+        fault = 0;
+    if (fault)
+        return fault;
+    *at = s->fresh ? s->beside : s->path;
+    if (make && s->fresh)
+        fault = set_aside(s);
+    if (!fault)
+        fault = lock(&s->lock, *at, only | (make ? O_CREAT | (s->fresh ? O_EXCL : 0) : 0), own);
+    if (fault)
         unlock(s);
-    return taken ? -1 : fault;
+    return fault;
+}
+
+/* Why the file `at` of the log `path` cannot be written. */
+static bool refuse(const char *path, const char *at, const sink *s, int fault, message *why)
+{
+    struct stat is;
+    const char *const slash = strrchr(at, '/');
+    bool const there = lstat(at, &is) == 0;
+    if (fault == EWOULDBLOCK)
+        return message_set(why, TAKEN, path);
+    if (there && !S_ISREG(is.st_mode) && s->beside[0])
+        return message_set(why, "--out %.100s: %.120s is not a regular file; remove it", path, at);
+    if (there && fault == EACCES)
+        return message_set(why, "--out %.160s: is read-only; give another name, or change its permissions",
+                           at);
+    if (fault == EACCES)
+        return message_set(why, "--out %.100s: folder %.*s cannot be written; give another place", path,
+                           slash > at ? (int)(slash - at) : 1, slash ? at : ".");
+    return message_set(why, "%.160s: this log cannot be written: %s", path, strerror(fault));
 }
 
 /* A new log has the mode of the file that it will replace. */
@@ -293,17 +375,27 @@ static void keep_mode(const sink *s)
 bool sink_open(sink *s, const char *url, message *why)
 {
     char path[LINK_PATH];
+    const char *at;
+    struct stat is;
     *s = (sink){0};
     if (!link_is_log(url))
         return (s->lcm = link_open(url, why)) != NULL;
     char const mode[2] = {set_names(s, url, path)};
-    if (lock_both(s, O_CREAT) == -1)
-        return message_set(why, TAKEN, path);
+    int const fault = lock_both(s, true, NULL, &at);
+    if (fault && !(fault == ENXIO && !s->beside[0])) /* not a pipe that no one reads yet */
+        return refuse(path, at, s, fault, why);
     keep_mode(s);
-    s->log = lcm_eventlog_create(s->fresh ? s->beside : s->path, mode); /* reports what could not be opened */
-    if (s->log)
+    s->log = lcm_eventlog_create(at, mode); /* LCM takes only a name */
+    bool const same =
+        s->log && (s->lock < 0 || (fstat(s->lock, &is) == 0 && is_file(fileno(s->log->f), &is)));
+    if (same)
         return true;
-    message_set(why, "%.160s: this log cannot be written: %s", path, strerror(errno));
+    if (s->log) {
+        lcm_eventlog_destroy(s->log);
+        s->log = NULL;
+        message_set(why, "--out %.160s: its file was replaced while it was opened; start again", path);
+    } else
+        message_set(why, "%.160s: this log cannot be written: %s", path, strerror(errno));
     unlock(s);
     return false;
 }
@@ -311,6 +403,8 @@ bool sink_open(sink *s, const char *url, message *why)
 bool sink_check(const char *url, const sink *own, message *why)
 {
     char path[LINK_PATH];
+    const char *at;
+    struct stat is;
     sink s = {0};
     if (!link_is_log(url)) {
         lcm_t *const lcm = link_open(url, why);
@@ -319,16 +413,14 @@ bool sink_check(const char *url, const sink *own, message *why)
         return lcm != NULL;
     }
     (void)set_names(&s, url, path);
-    if (own->log && strcmp(s.path, own->path) == 0)
-        return true;
-    int fault = lock_both(&s, 0);
-    if (fault == -1)
-        return message_set(why, TAKEN, path);
-    unlock(&s);
+    if (stat(s.path, &is) == 0 && S_ISFIFO(is.st_mode)) /* its reader would take the close for the end */
+        return access(s.path, W_OK) == 0 || refuse(path, s.path, &s, errno, why);
+    int fault = lock_both(&s, false, own, &at);
+    if (!fault)
+        unlock(&s);
     if (fault == ENOENT)
         fault = folder_fault(s.path);
-    return !fault || fault == ENXIO || /* a pipe that no one reads yet */
-           message_set(why, "%.160s: this log cannot be written: %s", path, strerror(fault));
+    return !fault || refuse(path, at, &s, fault, why);
 }
 
 static void lost(sink *s, const char *what)

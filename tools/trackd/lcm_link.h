@@ -39,15 +39,17 @@ typedef struct sink {       /* all zero: no output */
     lcm_eventlog_t *log;    /* or NULL */
     int lock, other;        /* with a log: descriptors that lock what is written and its other name, or -1 */
     char path[LINK_PATH];   /* of the log, not of a link to it */
-    char beside[LINK_PATH]; /* of link_unfinished() */
+    char beside[LINK_PATH]; /* of link_unfinished(); empty: a device or a pipe */
     bool fresh;             /* it is a new log */
     int64_t failed;         /* messages that did not go out */
     message fault;          /* of the first of them */
 } sink;
 
-/* Open `url`; a log has ?mode=w (new) or a (append), and no other writer. */
+/* Open `url`; a log has ?mode=w (new) or a (append), and no other writer.  What an earlier program left as NAME.unfinished.SUFFIX
+ * is kept as NAME.unfinished-2.SUFFIX or the next free number, and reported. */
 bool sink_open(sink *s, const char *url, message *why);
-/* Whether `url` could be opened by a program that ends the use of `own`, the output in use; changes nothing. */
+/* Whether `url` could be opened by a program that ends the use of `own`, the output in use; changes nothing, and does not
+ * open a pipe. */
 bool sink_check(const char *url, const sink *own, message *why);
 /* Publish `size` bytes on the channel of a person, 0: of all.  The first failure of LCM is reported on stderr; after
  * a failure of a log nothing more is written. */
