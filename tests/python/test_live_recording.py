@@ -1,10 +1,14 @@
 """Logs recorded by the live page: complete or marked as unfinished, and beginning with the camera."""
 
 import errno
+import fcntl
+import json
 import os
 import threading
 import time
 from io import FileIO
+from pathlib import Path
+from urllib.request import Request, urlopen
 
 import lcm
 import lcm_rig as rig
@@ -12,7 +16,7 @@ import pytest
 
 from gait.errors import UserError
 from gait.lcm import link
-from gait.lcm.link import events_of, private_url
+from gait.lcm.link import events_of, open_lcm, private_url
 from gait.live.feed import Feed
 from gait.live.recording import Recording
 from gait.live.server import Page
@@ -77,12 +81,71 @@ def test_a_recording_for_which_there_is_no_space_is_marked(tmp_path, monkeypatch
     assert f"gait view: the recording has ended: {recording.paths[0]}" in capfd.readouterr().err
 
 
+def test_a_recording_that_can_receive_no_more_is_marked(tmp_path, monkeypatch):
+    """The messages before are kept, the fault names their file, and another recording can begin."""
+    rig.need_multicast()
+
+    def waiting(links, seconds):
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+
+    monkeypatch.setattr("gait.live.recording.waiting", waiting)
+    page, reports = Page(0, [0], private_url(), tmp_path), []
+    monkeypatch.setattr(page, "report", lambda _, value: reports.append(value))
+    page.begin(dict, {"GAIT_CAMERA_0": b"camera"})
+    try:
+        first = Path(press(page, 1)["path"])
+        page._recording.end()
+        second = Path(press(page, 1)["path"])
+        stopped = press(page, 0)
+    finally:
+        page.close()
+    assert first != second and stopped["fault"] in [value.get("fault") for value in reports]
+    for path in (first, second):
+        kept = path.with_suffix(".unfinished.log")
+        assert [event.channel for event in events_of(kept)] == ["GAIT_CAMERA_0"]
+        words = f"Bad file descriptor; what was recorded is in {kept.name}"
+        assert words in {value["path"]: value["fault"] for value in reports if value.get("fault")}[str(path)]
+
+
+def press(page, on):
+    """Press the page's record button."""
+    own = page.address.rstrip("/")
+    with urlopen(Request(f"{own}/record?on={on}", headers={"Origin": own}, method="POST")) as answer:
+        return json.load(answer)
+
+
 def test_a_killed_recording_is_marked_when_the_page_is_opened_again(tmp_path, capfd):
     left = tmp_path / ".gait-20260102-030405-person-2.0123456789abcdef.log"
     left.write_bytes(rig.write_log(tmp_path / "in.log", rig.frames(0, 1)).read_bytes())
     Page(0, [0], private_url(), tmp_path).close()
     assert {p.name for p in tmp_path.iterdir()} == {"in.log", "gait-20260102-030405-person-2.unfinished.log"}
     assert "was killed; what it wrote is in" in capfd.readouterr().err
+
+
+def test_no_two_pages_choose_one_name(tmp_path, monkeypatch):
+    """While one chooses names and creates their files, another waits."""
+    rig.need_multicast()
+    real, refused = open_lcm, []
+
+    def opened(url):
+        other = os.open(tmp_path, os.O_RDONLY)
+        try:
+            fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            refused.append(len(list(tmp_path.glob(".gait-*.log"))))
+        finally:
+            os.close(other)
+        return real(url)
+
+    monkeypatch.setattr("gait.live.recording.open_lcm", opened)
+    monkeypatch.setattr("time.strftime", lambda _: "gait-20260102-030405")
+    (tmp_path / "gait-20260102-030405.unfinished.log").touch()
+    both = [Recording(private_url(), [], tmp_path, lambda: None) for _ in range(2)]
+    for one in both:
+        one.end()
+    assert refused == [1, 2]
+    assert [one.paths[0].name for one in both] == [f"gait-20260102-030405-{k}.log" for k in (1, 2)]
+    assert all(one.paths[0].is_file() for one in both)
 
 
 def test_what_is_a_log_already_is_not_recorded(tmp_path):

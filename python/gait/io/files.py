@@ -25,6 +25,10 @@ WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _LEFTOVER_AGE_S = 60.0
 
 
+class UnfinishedError(UserError):
+    """Raised in a `replacing` block that cannot go on, to keep what it has written."""
+
+
 @contextmanager
 def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | None = None) -> Iterator[Path]:
     """Yield a temporary file with the folder, suffix and mode of `path`; after success rename it to `path`.
@@ -33,8 +37,9 @@ def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | No
     the last one to finish wins.  A temporary file left by a killed command is renamed to
     NAME.unfinished.SUFFIX.  Once the block has succeeded, the file is on the disk even if the power fails.
 
-    `partial` is called with the temporary file if the block is interrupted or a disk is full.  If it returns
-    True, the file is worth keeping in that state, and is also renamed to NAME.unfinished.SUFFIX.
+    `partial` is called with the temporary file if the block is interrupted, a disk is full, or the block
+    raises `UnfinishedError`.  If it returns True, the file is worth keeping in that state, and is also
+    renamed to NAME.unfinished.SUFFIX.
 
     UserError if no file can be written there, as in `require_writable`, or the disk is full.
     """
@@ -151,7 +156,9 @@ def _keep(left: Path, target: Path, what: str) -> None:
 
 
 def _ends_early(error: BaseException) -> bool:
-    """Whether the error is an interrupt or a full disk, after which finished work is worth keeping."""
+    """Whether the error is one after which finished work is worth keeping."""
+    if isinstance(error, UnfinishedError):
+        return True
     cause = error.__cause__ if isinstance(error, UserError) else error
     return isinstance(cause, KeyboardInterrupt) or (
         isinstance(cause, OSError) and cause.errno in WRITE_ERRORS

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, closing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
 from gait.errors import UserError
-from gait.io.files import recover, replacing
+from gait.io.files import UnfinishedError, recover, replacing
 from gait.lcm.link import LogWriter, end_at_an_event, is_log, now, open_lcm, waiting
 from gait.progress import note
 
@@ -34,7 +36,7 @@ class Recording:
         files are not changed.  They get their names when they are complete; if one cannot be written, all
         are named ``gait-DATE-TIME.unfinished.log``, and so on.
     failed : callable
-        Called in the recording's thread when a log cannot be written; all logs have then ended.
+        Called in the recording's thread when it cannot go on; all logs have then ended.
     scene : mapping of str to bytes
         Encoded messages by channel with which the log of `url` begins: its cameras and backgrounds, without
         which it could not be tracked.
@@ -43,7 +45,7 @@ class Recording:
     ----------
     paths : list of Path
     fault : str or None
-        Why the logs are not complete.
+        Why the logs are not complete, and which files have what was recorded.
 
     Raises
     ------
@@ -62,11 +64,11 @@ class Recording:
         if is_log(url):
             raise UserError(f"{url}: is already a log; copy the file")
         further = {name: f"-person-{k}" for k, name in enumerate(people, 1) if name != url}
-        self.paths = _unused(Path(folder), ["", *further.values()])
         self.fault: str | None = None
         self._failed = failed
         self._links = []
-        with ExitStack() as stack:
+        with ExitStack() as stack, _alone_in(Path(folder)):
+            self.paths = _unused(Path(folder), ["", *further.values()])
             for name, path in zip([url, *further], self.paths, strict=True):
                 temporary = stack.enter_context(replacing(path, end_at_an_event))
                 log = stack.enter_context(closing(LogWriter(temporary, name=str(path))))
@@ -83,18 +85,31 @@ class Recording:
     def _run(self) -> None:
         try:
             with self._logs:
-                while not self._end.is_set():
-                    for link in waiting(self._links, _TURN):
-                        link.handle()
-        except UserError as error:
-            self.fault = str(error)
-            note(f"gait view: the recording has ended: {error}")
+                self._record()
+        except Exception as error:  # whatever it is, the page must not call the logs complete
+            kept = [n.name for path in self.paths for n in path.parent.glob(f"{path.stem}.unfinished*")]
+            where = f"; what was recorded is in {', '.join(kept)}" if kept else ""
+            self.fault = f"{_reason(error)}{where}"
+            note(f"gait view: the recording has ended: {self.fault}")
             self._failed()
+
+    def _record(self) -> None:
+        """Write messages until the end; UnfinishedError if no more can be received or written."""
+        try:
+            while not self._end.is_set():
+                for link in waiting(self._links, _TURN):
+                    link.handle()
+        except Exception as error:
+            raise UnfinishedError(_reason(error)) from error
 
     def end(self) -> None:
         """Complete the logs."""
         self._end.set()
         self._thread.join()
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
 
 
 def _write(log: LogWriter, channel: str, data: bytes) -> None:
@@ -107,15 +122,27 @@ def recover_recordings(folder: str | Path) -> None:
     recover(Path(folder), r"gait-\d{8}-\d{6}(-\d+)?(-person-\d+)?", ".log")
 
 
-def _unused(folder: Path, endings: Sequence[str]) -> list[Path]:
-    """Return names of no files, one for each ending."""
-    stem = time.strftime("gait-%Y%m%d-%H%M%S")
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Make a folder, and let no other page choose names there until the block has created its files."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
         raise UserError(f"{folder}: cannot be made: {error.strerror}") from None
+    try:
+        with suppress(OSError):  # some file systems lock no folders
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _unused(folder: Path, endings: Sequence[str]) -> list[Path]:
+    """Return names of no files, complete or not, one for each ending."""
+    stem = time.strftime("gait-%Y%m%d-%H%M%S")
     for k in range(100):
         paths = [folder / f"{stem}{f'-{k}' if k else ''}{ending}.log" for ending in endings]
-        if not any(path.exists() or list(folder.glob(f".{path.stem}.*")) for path in paths):
+        if not any([*folder.glob(f".{path.stem}.*"), *folder.glob(f"{path.stem}.*")] for path in paths):
             return paths
     raise UserError(f"{folder}: has logs of every possible name for this second")

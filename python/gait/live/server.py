@@ -262,7 +262,7 @@ class Page:
         """Begin a recording (``?on=1``) or end it (``?on=0``), if that is not already so."""
         on = request.query_params.get("on") == "1"
         ended = self._recording
-        if on and ended is None:
+        if on and (ended is None or ended.fault):
             try:
                 self._recording = Recording(
                     self._url, self._people, self._folder, self._report_recording, self._scene
@@ -270,8 +270,8 @@ class Page:
             except UserError as error:
                 return JSONResponse({"error": str(error)}, 409)
         elif not on and ended is not None:
+            await asyncio.to_thread(ended.end)  # a failure is reported meanwhile
             self._recording = None
-            await asyncio.to_thread(ended.end)
         self._report_recording()
         return JSONResponse(self._recorded() or ({} if ended is None else _described(ended)))
 
