@@ -1,6 +1,8 @@
 """The command line itself: help, versions, options out of their range, exit codes."""
 
 import argparse
+import errno
+import io
 import json
 import os
 import re
@@ -145,6 +147,16 @@ def test_an_error_without_a_text_still_states_the_remedy(monkeypatch, capsys):
     monkeypatch.setattr("gait.cli.info.run", fail)
     assert main(["info", "walk"]) == 1
     assert capsys.readouterr().err == "gait info: not enough memory: close other programs or give less\n"
+
+
+def test_a_full_disk_is_not_blamed_on_the_standard_output(monkeypatch, capsys):
+    def fail(args):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("gait.cli.info.run", fail)
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(io.BytesIO()))
+    assert main(["info", "walk"]) == 1
+    assert capsys.readouterr().err == "gait info: file: No space left on device\n"
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])

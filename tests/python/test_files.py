@@ -3,6 +3,7 @@
 import errno
 import os
 import resource
+import signal
 import subprocess
 import sys
 from contextlib import closing
@@ -137,6 +138,20 @@ def test_a_folder_is_filled_whole_or_not_at_all(tmp_path):
     with filling(path) as folder:
         (folder / "a.png").write_text("keeps its mode")
     assert (path / "a.png").stat().st_mode & 0o777 == 0o640
+
+
+def test_a_folder_for_which_there_is_no_space_is_named(tmp_path):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (10, limits[1]))
+        words = f"{tmp_path / 'new'}: File too large; choose another place"
+        with pytest.raises(UserError, match=words), filling(tmp_path / "new") as folder:
+            (folder / "a.html").write_text("x" * 100)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert not list(tmp_path.rglob("*.html"))
 
 
 def test_a_file_is_no_folder(tmp_path):

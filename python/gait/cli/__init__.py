@@ -131,7 +131,7 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
 def _unnamed(error: OSError) -> str:
     """Name what an OSError without a file name is about: the standard output if it cannot be written.
 
-    Errors of writing other files have their names.
+    An unbuffered one has nothing left to try again, and is named for any error of writing.
     """
     from gait.io.files import WRITE_ERRORS
 
@@ -140,7 +140,8 @@ def _unnamed(error: OSError) -> str:
     except OSError:
         _silence()
         return "standard output"
-    return "standard output" if error.errno in WRITE_ERRORS else "file"
+    unbuffered = getattr(sys.stdout, "write_through", False) and error.errno in WRITE_ERRORS
+    return "standard output" if unbuffered else "file"
 
 
 def _silence() -> None:

@@ -253,10 +253,20 @@ def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield an empty folder; if the block succeeds, move its files to the folder `path`, pages (.html) last.
 
     They are then on the disk even if the power fails; a page is not there before what it shows.
-    UserError if there can be no such folder, as in `require_folder`.
+    UserError if there can be no such folder, as in `require_folder`, or the disk is full.
     """
     require_folder(path)
-    folder = Path(path)
+    try:
+        with _filling(Path(path)) as new:
+            yield new
+    except OSError as error:
+        if error.errno not in WRITE_ERRORS:
+            raise
+        raise UserError(f"{path}: {error.strerror}; choose another place") from error
+
+
+@contextmanager
+def _filling(folder: Path) -> Iterator[Path]:
     new = [p for p in (folder, *folder.parents) if not p.exists()]
     beside = folder if folder.is_dir() else folder.parent
     beside.mkdir(parents=True, exist_ok=True)
