@@ -72,14 +72,14 @@ def start_quality(track: Track, true_phase: np.ndarray) -> dict[str, Any]:
 
     ``side`` is ``wrong`` if more than `WRONG` of the later frames are half a cycle off while the status is
     ``tracking``, else ``right`` if at least half of them are ``tracking``, ``open`` if at least half are that
-    or ``ambiguous``, else ``lost``.
+    or ``ambiguous``, else ``lost``.  Frames without a phase, in which the person stands, do not count.
     """
     since = track.time - track.time[0]
     error = phase_difference(track.phase, true_phase)
     flipped = np.abs(error) > 0.25
     left = np.abs(np.where(flipped, np.abs(error) - 0.5, error))
-    window = (since >= LOCK_AFTER[0]) & (since <= LOCK_AFTER[1])
-    later = since >= LOCK_AFTER[0]
+    later = (since >= LOCK_AFTER[0]) & np.isfinite(error)
+    window = later & (since <= LOCK_AFTER[1])
     if not window.any():
         return {"locked": None, "side": None}
     status = np.array(track.status)[later]

@@ -65,6 +65,10 @@ def test_a_swapped_start_is_wrong_only_while_it_reports_tracking():
     assert eval_measures.start_quality(track(phase=late), PHASE)["side"] == "right"
     drifting = eval_measures.start_quality(track(phase=(PHASE + 0.1) % 1), PHASE)
     assert not drifting["locked"] and drifting["side"] == "right"
+    stands = np.where(np.arange(100) % 3 == 0, np.nan, PHASE)
+    assert eval_measures.start_quality(track(), stands) == eval_measures.start_quality(track(), PHASE)
+    none = {"locked": None, "side": None}
+    assert eval_measures.start_quality(track(), np.full(100, np.nan)) == none
 
 
 def test_strikes_of_a_track_are_held_against_the_known_ones():
