@@ -22,7 +22,7 @@ class Stage:
     """People as rectangles of colour, and the two networks that see them exactly."""
 
     def __init__(self, monkeypatch):
-        self.places, self.reach, self.depth = {}, 60, 1.0
+        self.places, self.reach, self.depth, self.fps = {}, 60, 1.0, 25
         monkeypatch.setattr(
             people, "PersonNetwork", lambda: lambda image, small: [list(map(self.crop, self.visible()))]
         )
@@ -62,7 +62,7 @@ class Stage:
             image[at], nearest[at] = RED if name.startswith("red") else BLUE, k
         self.image, self.area = image, 40 * 130
         self.drawn = [(place, nearest == k) for k, place in enumerate(places.values())]
-        found = self.detector.step(Frame(number, number / 25, image))
+        found = self.detector.step(Frame(number, number / self.fps, image))
         return {one.id: float(person.uv[:, 0].mean()) for one, person in found}
 
 
@@ -173,6 +173,22 @@ def test_ids_swapped_where_two_people_met_are_swapped_back(stage, depth, swapped
     for n in range(-15, 0):
         places = [who.keypoints[n].uv[:, 0].mean() for who in (one, other)]
         assert places == ([300, 380 + 2 * n] if swapped else [380 + 2 * n, 300])
+
+
+@pytest.mark.parametrize(
+    ("fps", "wrong", "swapped"), [(25, 2, False), (25, 4, True), (100, 8, False), (100, 14, True)]
+)
+def test_feet_swap_ids_after_the_same_time_at_any_frame_rate(stage, fps, wrong, swapped):
+    """Both wear red, and come apart; the feet of each then are where the other's were, for some frames."""
+    stage.depth, stage.fps = 12.0, fps
+    stage.detector = people.PeopleDetector(everyone=True, empty=np.zeros((200, 640, 3), np.uint8))
+    frames = np.arange(61 * fps // 25)
+    for n in frames:
+        stage.step(n, red=220 + 50 * n / fps, red2=300)
+    stage.depth = -12.0
+    for n in range(len(frames), len(frames) + wrong):
+        found = stage.step(n, red=220 + 50 * n / fps, red2=300)
+    assert found[2 if swapped else 1] == pytest.approx(220 + 50 * n / fps)
 
 
 def test_clothes_show_whether_two_people_are_swapped(stage):

@@ -68,6 +68,9 @@ _TRUNKS_APART = 0.1  # crop sides from which the trunks of two people do not ove
 _STANCE = 0.25  # seconds within which a foot is on the ground
 _FEET = 3.0  # weight of a difference of feet in crop sides, beside that of overlaps of colours
 _MOST_GAIN = 0.4  # by one frame, of what swapping two ids gains
+#: Seconds since the last frame from which a frame counts in full, less if it is sooner: errors of clothes and
+#: feet last longer than that.
+_GAIN_TIME = 0.04
 _SURELY_SWAPPED = 1.0  # sum of gains from which ids are swapped
 _MOST_PEOPLE = 8  # people
 _LEAST_FRAMES = 3  # frames in which a person must be found
@@ -201,6 +204,7 @@ class PeopleDetector:
         self._most, self._everyone, self._live = most, everyone, live
         self._ids = itertools.count(1)
         self._scanned = self._scanned_for_all = -np.inf
+        self._latest = -np.inf  # time of the last frame
         self._searched = 0  # sizes of parts that the last scan had searched when it found someone new
         #: Of two people near each other who may be swapped since a frame, the frame and how sure it is.
         self._met: dict[frozenset[int], tuple[int, float]] = {}
@@ -240,6 +244,7 @@ class PeopleDetector:
             self._scanned = frame.time
             self._searched = self._scan(frame, found)
         self._undo_swaps(frame, found)
+        self._latest = frame.time
         if self._live:
             for one, _ in found:
                 one.forget()
@@ -275,6 +280,7 @@ class PeopleDetector:
         This begins after the last frame in which both were found and nothing showed it.
         """
         meet: set[int] = set()
+        share = min((frame.time - self._latest) / _GAIN_TIME, 1.0)
         for i, j in itertools.combinations(range(len(found)), 2):
             (one, a), (other, b) = found[i], found[j]
             pair, apart = _pair(one, other), _apart(a.crop, b.crop)
@@ -284,7 +290,7 @@ class PeopleDetector:
                 meet |= pair
                 since, sure = self._met.get(pair, (frame.number, 0.0))
                 if apart >= _TRUNKS_APART:
-                    sure = max(sure + self._swap_gain(frame, found[i], found[j]), 0.0)
+                    sure = max(sure + share * self._swap_gain(frame, found[i], found[j]), 0.0)
                 self._met[pair] = (since if sure > 0 else frame.number, sure)
                 if sure >= _SURELY_SWAPPED:
                     _swap(one, other, since)
