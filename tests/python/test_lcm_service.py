@@ -132,11 +132,12 @@ def test_only_a_snapshot_is_replaced_and_only_a_folder_that_takes_it_accepted(tm
 
 
 @pytest.fixture
-def manager(tmp_path, monkeypatch):
+def manager(monkeypatch):
     """What a service manager receives, in order: each call returns the next line that is not WATCHDOG=1."""
     sock, lines = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM), SimpleQueue()
-    sock.bind(str(tmp_path / "notify"))
-    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+    name = f"gait-trackd-test-{os.getpid()}"  # abstract: the paths of tests may be too long for a socket
+    sock.bind(f"\0{name}")
+    monkeypatch.setenv("NOTIFY_SOCKET", f"@{name}")
 
     def listen():
         while line := sock.recv(256):
@@ -152,7 +153,7 @@ def manager(tmp_path, monkeypatch):
 
     yield reported
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
-        end.sendto(b"", str(tmp_path / "notify"))
+        end.sendto(b"", f"\0{name}")
     thread.join()
     sock.close()
 

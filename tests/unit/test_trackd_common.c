@@ -32,7 +32,7 @@ enum { COUNT = sizeof CASES / sizeof *CASES };
 static void test_message(void)
 {
     message m, again;
-    char longest[300];
+    char longest[sizeof m.text + 1];
     for (int i = 0; i < COUNT; i++) {
         CHECK(!message_set(&m, "%s", CASES[i].text) && strcmp(m.text, CASES[i].shown) == 0);
         CHECK(!message_set(&again, "%s", m.text) && strcmp(again.text, m.text) == 0);

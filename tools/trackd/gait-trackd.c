@@ -228,13 +228,13 @@ static bool check_result(const char *path, const service *s, message *why)
     if (s->shared->lift && s->shared->lift->lifted > 0)
         return true;
     if (s->shared->arrived == 0 && keypoints == 0)
-        return message_set(why, "%.120s: no frames on GAIT_IMAGE_%d%s; --stream selects another camera", path,
+        return message_set(why, "%.200s: no frames on GAIT_IMAGE_%d%s; --stream selects another camera", path,
                            s->shared->stream, s->shared->lift ? " and no keypoints of a known camera" : "");
     if (s->shared->arrived == 0)
-        return message_set(why, "%.80s: none of its %" PRId64 " messages of keypoints was lifted: %.110s",
+        return message_set(why, "%.200s: none of its %" PRId64 " messages of keypoints was lifted: %.200s",
                            path, keypoints, lack.text[0] ? lack.text : "too few");
     service_lack(s, &lack);
-    return message_set(why, "%.80s: none of its %" PRId64 " frames was tracked: %.130s", path,
+    return message_set(why, "%.200s: none of its %" PRId64 " frames was tracked: %.200s", path,
                        s->shared->arrived, lack.text);
 }
 

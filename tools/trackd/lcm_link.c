@@ -46,7 +46,7 @@ static int64_t scan(const char *path, bool *safe, message *why)
     FILE *const f = regular ? fopen(path, "rb") : NULL;
     *safe = false;
     if (!f) {
-        message_set(why, "%.160s: cannot open this log: %s", path,
+        message_set(why, "%.200s: cannot open this log: %s", path,
                     there && !regular ? "it is not a regular file" : strerror(errno));
         return -1;
     }
@@ -60,10 +60,10 @@ static int64_t scan(const char *path, bool *safe, message *why)
     /* liblcm searches for the first event, and allocates what an event states */
     *safe = events > 0 && size <= is.st_size;
     if (is.st_size == 0)
-        message_set(why, "%.160s: this log is empty", path);
+        message_set(why, "%.200s: this log is empty", path);
     else if (at != is.st_size)
         message_set(
-            why, "%.150s: this log is damaged or truncated at byte %" PRId64 ", after %" PRId64 " messages",
+            why, "%.200s: this log is damaged or truncated at byte %" PRId64 ", after %" PRId64 " messages",
             path, at, events);
     return events;
 }
@@ -170,7 +170,7 @@ lcm_t *link_open(const char *url, message *why)
     lcm_t *const lcm = lcm_create(url);
     unmute();
     if (!lcm && link_is_log(url))
-        message_set(why, "%.160s: liblcm cannot read this log", path);
+        message_set(why, "%.200s: liblcm cannot read this log", path);
     else if (!lcm && is_unreachable(url, why))
         return NULL;
     else if (!lcm && strstr(url, "udpm://")) /* or mpudpm:// */
@@ -203,7 +203,7 @@ const char *link_channel(const char *channel, int person, char name[LINK_CHANNEL
 }
 
 /* ---- output ---- */
-#define TAKEN "--out %.160s: another program is writing this log; give another name"
+#define TAKEN "--out %.200s: another program is writing this log; give another name"
 
 /* Where a log is: what a chain of links points to, whether it is there or not.  A device or a pipe keeps its name, as links
  * of /proc to a pipe lead to no name.  Returns whether it is one of these, or a folder. */
@@ -318,7 +318,7 @@ static int set_aside(const sink *s)
     else if (rename(s->beside, kept) != 0)
         fault = errno;
     else
-        log_line("--out %.160s: an earlier log was not finished; it is now in %.80s", s->path,
+        log_line("--out %.200s: an earlier log was not finished; it is now in %.100s", s->path,
                  slash ? slash + 1 : kept);
     close(file);
     return fault;
@@ -348,20 +348,22 @@ static int lock_both(sink *s, bool make, const sink *own, const char **at)
 /* Why the file `at` of the log `path` cannot be written. */
 static bool refuse(const char *path, const char *at, const sink *s, int fault, message *why)
 {
+    enum { LONGEST_SHOWN = 200 };
     struct stat is;
     const char *const slash = strrchr(at, '/');
+    int const length = slash > at ? (int)(slash - at) : 1; /* of the folder's name */
     bool const there = lstat(at, &is) == 0;
     if (fault == EWOULDBLOCK)
         return message_set(why, TAKEN, path);
     if (there && !S_ISREG(is.st_mode) && s->beside[0])
-        return message_set(why, "--out %.100s: %.120s is not a regular file; remove it", path, at);
+        return message_set(why, "--out %.200s: %.200s is not a regular file; remove it", path, at);
     if (there && fault == EACCES)
-        return message_set(why, "--out %.160s: is read-only; give another name, or change its permissions",
+        return message_set(why, "--out %.200s: is read-only; give another name, or change its permissions",
                            at);
     if (fault == EACCES)
-        return message_set(why, "--out %.100s: folder %.*s cannot be written; give another place", path,
-                           slash > at ? (int)(slash - at) : 1, slash ? at : ".");
-    return message_set(why, "%.160s: this log cannot be written: %s", path, strerror(fault));
+        return message_set(why, "--out %.200s: folder %.*s cannot be written; give another place", path,
+                           length < LONGEST_SHOWN ? length : LONGEST_SHOWN, slash ? at : ".");
+    return message_set(why, "%.200s: this log cannot be written: %s", path, strerror(fault));
 }
 
 /* A new log has the mode of the file that it will replace. */
@@ -369,7 +371,7 @@ static void keep_mode(const sink *s)
 {
     struct stat old;
     if (s->fresh && s->other >= 0 && fstat(s->other, &old) == 0 && fchmod(s->lock, old.st_mode & 0777) != 0)
-        log_line("--out %.160s: keeps no permissions: %s", s->path, strerror(errno));
+        log_line("--out %.200s: keeps no permissions: %s", s->path, strerror(errno));
 }
 
 bool sink_open(sink *s, const char *url, message *why)
@@ -393,9 +395,9 @@ bool sink_open(sink *s, const char *url, message *why)
     if (s->log) {
         lcm_eventlog_destroy(s->log);
         s->log = NULL;
-        message_set(why, "--out %.160s: its file was replaced while it was opened; start again", path);
+        message_set(why, "--out %.200s: its file was replaced while it was opened; start again", path);
     } else
-        message_set(why, "%.160s: this log cannot be written: %s", path, strerror(errno));
+        message_set(why, "%.200s: this log cannot be written: %s", path, strerror(errno));
     unlock(s);
     return false;
 }
@@ -486,7 +488,7 @@ static void leave(const sink *s, message *why)
     if (is.st_size == 0)
         unlink(s->beside);
     else
-        message_set(why, "%.150s; what was written is in %.80s", reason.text, slash ? slash + 1 : s->beside);
+        message_set(why, "%.500s; what was written is in %.100s", reason.text, slash ? slash + 1 : s->beside);
 }
 
 bool sink_close(sink *s, bool ok, message *why)
