@@ -72,11 +72,11 @@ def test_people_who_cross_keep_their_numbers(crossing, tmp_path, monkeypatch, ca
     words += ["-o", "t.csv", "--overlay", "o.mp4", "--particles", "400", "--report", "r.html"]
     monkeypatch.chdir(tmp_path)
     assert main(words) == 0
-    printed = capsys.readouterr().out
+    printed, errors = capsys.readouterr()
     assert "person 1: Tracked" in printed and "person 2: Tracked" in printed and "t-2.csv" in printed
     u, v = people[5].uv[0].mean(axis=0)
     other = f"omeone in view from frame 0 to 43, at first near pixel ({u:.0f}, {v:.0f}), is not tracked"
-    assert f"\ns{other}" in printed
+    assert printed.count(f"\ns{other}") == 1 and other not in errors  # once
     assert Video("o.mp4").count == FRAMES
     page = (tmp_path / "r.html").read_text()
     accessibility.check_file(tmp_path / "r.html")

@@ -23,7 +23,7 @@ from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.keypoints_file import Keypoints
 from gait.io.video import Frame
-from gait.progress import note, progress, warning
+from gait.progress import note, progress
 from gait.report.colours import PERSON_COLOURS
 from gait.report.drawing import Overlay
 from gait.report.film import Films, PageFilm
@@ -102,7 +102,8 @@ def numbered(path: str, id: int) -> str:
 def _starts(options: ClipOptions, scene: Scene) -> tuple[dict[int, Start], dict[int, str]]:
     """Find the first state of everyone who walks, in the order of `by_size`; and why others do not."""
     starts: dict[int, Start] = {}
-    more = f"--people {options.people} leaves them out"
+    most = options.people
+    more = f"at most {most} people are tracked" if most == MOST_PEOPLE else f"--people {most} leaves them out"
     others = {id: _not_tracked(scene, id, more) for id in by_size(scene.people)}
     for id in by_size(scene.people):
         if len(starts) == options.people:
@@ -112,7 +113,6 @@ def _starts(options: ClipOptions, scene: Scene) -> tuple[dict[int, Start], dict[
         found = start_in_keypoints(scene, id, frames.start, frames.stop, stature, best_second=True)
         if found is None or not found.hypotheses[0].walks:
             others[id] = _not_tracked(scene, id, "no second in which they walk in full view")
-            warning(others[id], options.quiet)
         else:
             del others[id]
             starts[id] = replace(found, source="the joints detected in the images")
