@@ -269,7 +269,7 @@ static void test_log(void)
     CHECK(unlink(beside) == 0 && sink_open(&s, url, &why));
     sink_publish(&s, "A", 0, data, 9);
     sink_publish(&s, "A", 0, data, 9);
-    message_set(&why, "the program failed");
+    message_set(&why, "%0200d: the program failed", 0); /* after a long path */
     CHECK(!sink_close(&s, false, &why) &&
           strstr(why.text, "the program failed; what was written is in gait_link"));
     CHECK(log_scan(name, &why) == 1 && log_scan(beside, &why) == 2);

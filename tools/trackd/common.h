@@ -10,7 +10,7 @@
 
 /* ---- one line that reports a fault, set where it is found. */
 typedef struct message {
-    char text[640]; /* room for two paths */
+    char text[640]; /* holds two long paths and a reason */
 } message;
 
 /* Write the line, with everything that text from outside could do to a terminal or a log made visible: control characters
