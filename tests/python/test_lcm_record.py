@@ -215,6 +215,10 @@ WRONG = (
     {"mode_mass": float("inf")},
     {"mean": lambda mean: spoilt(mean, heading=float("nan"))},
     {"mean": lambda mean: spoilt(mean, ncoef=10**9)},
+    {"mean": lambda mean: spoilt(mean, noffset=-1)},
+    {"sd": lambda sd: spoilt(sd, ncoef=17)},
+    {"sd": lambda sd: spoilt(sd, noffset=33)},
+    {"best": lambda best: spoilt(best, ncoef=-1)},
     {"mean": lambda mean: spoilt(mean, coef=[3e38] * 16)},
     {"sd": lambda sd: spoilt(sd, stature=-1.0)},
     {"joints": lambda joints: [spoilt(joints[0], position=[3e38] * 3), *joints[1:]]},
@@ -241,12 +245,13 @@ def test_messages_that_no_track_may_contain_are_left_out(estimates, tmp_path):
         events = list(estimates)
         for place, change in enumerate(WRONG[k : k + 10]):
             events.insert(2 * place, spoilt(estimates[place], **change))
+        count = len(WRONG[k : k + 10]) + 1
         events.append(spoilt(estimates[-1], **WRONG[k]))
         log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in events])
         words = ["--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--log", tmp_path / "e.log"]
         done = rig.gait("record", *words, "--json")
-        assert done.returncode == 0 and "messages skipped: 11, first: " in done.stderr
-        assert json.loads(done.stdout)["damaged"] == 11 and json.loads(done.stdout)["lost"] == 0
+        assert done.returncode == 0 and f"messages skipped: {count}, first: " in done.stderr
+        assert json.loads(done.stdout)["damaged"] == count and json.loads(done.stdout)["lost"] == 0
         assert len(read_track(tmp_path / "t.csv").frame) == COUNT
         assert read_run(str(tmp_path / "e.log")).remark is None and len(read_run(str(log)).frame) == COUNT
 

@@ -6,6 +6,7 @@ import json
 import os
 import threading
 import time
+from copy import copy
 from io import FileIO
 from pathlib import Path
 from urllib.request import Request, urlopen
@@ -41,12 +42,17 @@ def test_a_recording_has_a_log_for_each_persons_tracker(tmp_path):
 def test_a_recording_begins_with_camera_and_background(tmp_path):
     """They may have come long before."""
     opening = [*rig.opening(), ("GAIT_BACKGROUND_0", rig.frames(0, 1)[0][1]), *rig.frames(0, 1)]
+    camera = next(message for channel, message in opening if channel == "GAIT_CAMERA_0")
+    wrong = copy(camera)
+    wrong.fx = 0.0
+    opening += [("GAIT_CAMERA_0", wrong), ("GAIT_BACKGROUND_0", camera)]  # not kept, nor of other numbers
+    opening += [(f"GAIT_{kind}_{k}", camera) for kind in ("CAMERA", "BACKGROUND") for k in (31, 100, "01")]
     url = f"file://{rig.write_log(tmp_path / 'in.log', opening)}?speed=0"
     feed = Feed(url, [0], rig.model(), {}, lambda *_: None)
     while feed.handle(1.0):
         pass
     scene = feed.scene
-    assert set(scene) == {"GAIT_CAMERA_0", "GAIT_BACKGROUND_0"}
+    assert set(scene) == {"GAIT_CAMERA_0", "GAIT_BACKGROUND_0"} and scene["GAIT_CAMERA_0"] == camera.encode()
     rig.need_multicast()
     recording = Recording(private_url(), [], tmp_path, lambda: None, scene)
     recording.end()

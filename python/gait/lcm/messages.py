@@ -63,8 +63,11 @@ def estimate_after(
         raise UserError(f"{channel}: an estimate with other joints than before")
     if not (-1 <= message.frame <= LAST_FRAME and 0 <= message.step <= LAST_FRAME):
         raise UserError(f"{channel}: an estimate of frame {message.frame}, step {message.step}")
-    if not 0 <= message.mean.ncoef <= MAX_COMPONENTS:
-        raise UserError(f"{channel}: an estimate with {message.mean.ncoef} components")
+    for state in (message.mean, message.sd, message.best):
+        if not (0 <= state.ncoef <= len(state.coef) and 0 <= state.noffset <= len(state.offset)):
+            raise UserError(
+                f"{channel}: an estimate of {state.ncoef} components, {state.noffset} joint angles"
+            )
     fits = classes is not None and classes.utime == message.utime
     estimate = estimate_of(message, classes if fits else None)
     if (fault := fault_of(estimate)) is not None:

@@ -34,6 +34,7 @@ _QUEUED = 8  # frames that wait in LCM
 _LONGEST_PAUSE_S = 0.5
 _ANNOUNCED = 1.0  # seconds between reports that frames arrive
 _RATED = 2.0  # seconds over which estimates are counted
+_NUMBERS = "[0-9]|[12][0-9]|30"  # of cameras, as gait capture and gait-trackd allow
 KEPT_S = 20.0
 """Duration of the plots, seconds."""
 
@@ -187,7 +188,7 @@ class Feed:
         self._drawn, self._announced = 0.0, -np.inf
         self.damage: str | None = None
         self.scene: dict[str, bytes] = {}
-        self._subscribe(url, "GAIT_(CAMERA|BACKGROUND)_[0-9]+", self.scene.__setitem__, _QUEUED)
+        self._subscribe(url, f"GAIT_(CAMERA|BACKGROUND)_({_NUMBERS})", self._on_scene, _QUEUED)
         for stream, camera in cameras.items():
             self._views[stream].use(camera, model)
         for stream in streams:
@@ -266,6 +267,14 @@ class Feed:
         if self._report and time.monotonic() - self._announced > _ANNOUNCED:
             self._announced = time.monotonic()
             self._report("frames", {"stream": stream})
+
+    def _on_scene(self, channel: str, data: bytes) -> None:
+        """Keep the newest camera or background, for recordings."""
+        if "CAMERA" in channel:
+            camera_of(decode(gaitmsg.camera_t, data, channel))
+        else:
+            decode(gaitmsg.image_t, data, channel)
+        self.scene[channel] = data
 
     def _on_camera(self, stream: int, channel: str, data: bytes) -> None:
         view = self._views[stream]
