@@ -90,8 +90,19 @@ static void test_twice_is_nothing(void)
     }
 }
 
+/* Only l_ and r_ are sides, and the rest of the name is the same. */
+static void test_other_side(void)
+{
+    static const char name[][MODEL_NAME] = {"l_knee", "head", "r_knee_flexion", "r_knee",
+                                            "lead",   "read", "l_toe"};
+    static const int32_t other[] = {3, 1, 2, 0, 4, 5, 6};
+    for (int32_t i = 0; i < 7; i++)
+        CHECK(model_other_side(name, 7, i) == other[i]);
+}
+
 int main(void)
 {
+    test_other_side();
     test_the_image_is_the_mirrored_body();
     test_twice_is_nothing();
     return CHECK_DONE();
