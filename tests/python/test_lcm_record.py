@@ -256,7 +256,10 @@ def test_messages_that_no_track_may_contain_are_left_out(estimates, tmp_path):
         assert read_run(str(tmp_path / "e.log")).remark is None and len(read_run(str(log)).frame) == COUNT
 
 
-def test_wrong_classes_are_left_out(estimates, tmp_path):
+@pytest.mark.parametrize("first", [0, 3])
+def test_wrong_classes_are_left_out(first, estimates, tmp_path):
+    """Also if they come first: names are those of two successive messages."""
+
     def classes(of, **changes):
         message = gaitmsg.classes_t()
         message.utime, message.nclasses, message.most_probable = of.utime, 2, 1
@@ -266,12 +269,16 @@ def test_wrong_classes_are_left_out(estimates, tmp_path):
     changes = [{"most_probable": 2}, {"probability": [float("nan"), 1.0]}, {"name": ["walk", "fly"]}]
     events = [(channel, e) for e in estimates for channel in ("GAIT_CLASSES", "GAIT_ESTIMATE")]
     events = [(channel, classes(e) if channel == "GAIT_CLASSES" else e) for channel, e in events]
-    for k, change in enumerate(changes, 3):
+    for k, change in enumerate(changes[:: -1 if first == 0 else 1], first):
         events[2 * k] = "GAIT_CLASSES", classes(estimates[k], **change)
     log = rig.write_log(tmp_path / "in.log", events)
     done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv")
     assert done.returncode == 0 and "messages skipped: 3, first: GAIT_CLASSES: " in done.stderr
-    assert read_track(tmp_path / "t.csv").motion_class == [*["stand"] * 3, *[""] * 3, *["stand"] * 14]
+    wanted = [*["stand"] * first, *[""] * 3, *["stand"] * (17 - first)]
+    assert read_track(tmp_path / "t.csv").motion_class == wanted
+    run = read_run(str(log))
+    found = ["stand" if len(one.class_probability) == 2 else "" for one in run.estimates]
+    assert found == wanted and "a message is skipped" in run.remark
 
 
 def test_a_log_played_again_is_another_stream(estimates, tmp_path):

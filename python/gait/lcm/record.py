@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,8 @@ LISTENING = "listening"
 _NO_IMAGE = np.empty((0, 0), np.uint8)
 _TURN = 0.1  # seconds; longest wait before checking whether to stop
 _QUEUE = 1000  # estimates that may wait for the disk
+_LONGEST_WAIT = 10  # estimates until the names of the classes must be known
+_OTHER_CLASSES = "other classes of motion than the stream's"
 _SNAPSHOT = 1_000_000  # microseconds; period of gait-trackd's snapshots
 
 
@@ -93,6 +95,35 @@ def channel_of(person: int | None, channel: str = ESTIMATE) -> str:
     return channel if person is None else f"{channel}_{person}"
 
 
+class _ClassNames:
+    """Names of a stream's classes of motion: the first that two successive messages have; others are wrong.
+
+    Until then, `names` are those of the newest message.
+    """
+
+    def __init__(self) -> None:
+        self.names: tuple[str, ...] = ()
+        self._agreed = False
+
+    @property
+    def known(self) -> bool:
+        """Whether `names` cannot change any more, or there are no messages."""
+        return self._agreed or not self.names
+
+    def add(self, message: Any, channel: str) -> None:
+        """Take the names of a ``classes_t``; UserError if they are wrong."""
+        names = tuple(message.name)
+        if self._agreed and names != self.names:
+            raise UserError(f"{channel}: {_OTHER_CLASSES}")
+        self._agreed = names == self.names
+        self.names = names
+
+
+def _without_classes(estimate: Estimate) -> Estimate:
+    """Make an estimate like those that come without a ``classes_t``."""
+    return replace(estimate, motion_class="walk", class_probability=np.ones(1))
+
+
 class Recorder:
     """Records estimates as they arrive.
 
@@ -130,9 +161,9 @@ class Recorder:
         self._lcm, self._live, self._url = listener(url), not is_log(url), url
         self._output, self._path, self._person = output, log, person
         self._channel = channel_of(person, channel)
-        self._waiting: list[tuple[Any, Estimate]] = []
+        self._waiting: list[tuple[Any, Estimate, tuple[str, ...]]] = []  # with the names of its classes
         self._classes: tuple[Any, bytes] | None = None  # the newest
-        self._names: tuple[str, ...] = ()  # of the classes
+        self._names = _ClassNames()
         self._writer: TrackWriter | None = None
         self._log: LogWriter | None = None
         self._origin = 0
@@ -192,8 +223,7 @@ class Recorder:
     def _on_classes(self, channel: str, data: bytes) -> None:
         try:
             classes = classes_message(data, channel)
-            if self._names and tuple(classes.name) != self._names:
-                raise UserError(f"{channel}: other classes of motion than before")
+            self._names.add(classes, channel)
             self._classes = classes, data
         except UserError as fault:
             self._skip(fault)
@@ -221,15 +251,14 @@ class Recorder:
         self.figures.add(message, arrived)
         if classes is not None and classes.utime != message.utime:
             classes = None
-        if classes is not None:
-            self._names = tuple(classes.name)
         if self._log is not None:
             if classes is not None:
                 self._log.write(arrived, self._classes_channel, encoded)
             self._log.write(arrived, channel, data)
         self._last = time.monotonic()
-        self._waiting.append((message, estimate))
-        if self._writer is not None or len(self._waiting) == 2:
+        self._waiting.append((message, estimate, () if classes is None else tuple(classes.name)))
+        known = self._names.known or len(self._waiting) == _LONGEST_WAIT
+        if self._writer is not None or (len(self._waiting) > 1 and known):
             self._flush()
 
     def _require_whole(self) -> None:
@@ -266,10 +295,16 @@ class Recorder:
         )
 
     def _flush(self) -> None:
-        """Write waiting rows; the first waits for the second, as both are needed for the time of frame 0."""
+        """Write waiting rows.
+
+        The first waits for the second, as both are needed for the time of frame 0, and for names of classes.
+        """
         if self._waiting and self._writer is None:
             self._open()
-        for message, estimate in self._waiting:
+        for message, estimate, names in self._waiting:
+            if names not in ((), self._names.names):
+                self._skip(UserError(f"{self._classes_channel}: {_OTHER_CLASSES}"))
+                estimate = _without_classes(estimate)
             assert self._writer is not None
             seconds = (message.utime - self._origin) / 1e6
             self._writer.write(Frame(_number(message), seconds, _NO_IMAGE), estimate)
@@ -282,7 +317,9 @@ class Recorder:
         joints = tuple(joint.name for joint in first.joints)
         angles = tuple(angle.name for angle in first.angles)
         self._writer = self._stack.enter_context(
-            TrackWriter(self._output, first.mean.ncoef, joints, angles, self._names, person=self._person)
+            TrackWriter(
+                self._output, first.mean.ncoef, joints, angles, self._names.names, person=self._person
+            )
         )
 
 
@@ -360,6 +397,7 @@ def read_run(path: str, person: int | None = None) -> Run:
     messages: list[Any] = []
     estimates: list[Estimate] = []
     classes: Any = None  # the newest classes, which come before their estimate
+    named, names = _ClassNames(), list[tuple[str, ...]]()
     remark, damage = None, None
     arrived: list[int] = []
     for event in events_of(path, whole=False):
@@ -367,7 +405,9 @@ def read_run(path: str, person: int | None = None) -> Run:
             continue
         try:
             if event.channel != channel_of(person):
-                classes = classes_message(event.data, path)
+                found = classes_message(event.data, path)
+                named.add(found, path)
+                classes = found
                 continue
             message, estimate = estimate_after(event.data, path, messages[0] if messages else None, classes)
             if not messages:
@@ -380,10 +420,15 @@ def read_run(path: str, person: int | None = None) -> Run:
             break
         messages.append(message)
         estimates.append(estimate)
+        names.append(tuple(classes.name) if classes is not None and classes.utime == message.utime else ())
         arrived.append(event.timestamp)
     if not messages:
         why = damage or break_of(path) or "record while gait-trackd is tracking"
         raise UserError(f"{path}: contains no {channel_of(person)} message; {why}")
+    for k, of_one in enumerate(names):
+        if of_one not in ((), named.names):
+            damage = damage or f"a message is skipped: {path}: {_OTHER_CLASSES}"
+            estimates[k] = _without_classes(estimates[k])
     utime = np.array([m.utime for m in messages], np.int64)
     return Run(
         frame=np.array([m.frame for m in messages], np.int64),
