@@ -223,8 +223,11 @@ def test_a_page_gets_each_estimate_and_the_state_of_the_tracker(log):
         assert one["time"] == pytest.approx(1e-6 * (estimate.utime - estimates[0].utime))
         np.testing.assert_allclose(one["points"], [j.position for j in estimate.joints], atol=1e-4)
         assert one["values"][0] == pytest.approx(np.degrees(angles["l_knee_flexion"]), abs=1e-3)
-        rate = estimate.mean.stride_hz if one["frame"] != 5 else 0.0
-        assert one["cadence"] == pytest.approx(120 * rate, abs=0.1)
+        if one["frame"] == 5:
+            assert one["cadence"] is None and one["phase"] is None
+        else:
+            assert one["cadence"] == pytest.approx(120 * estimate.mean.stride_hz, abs=0.1)
+            assert one["phase"] == pytest.approx(estimate.mean.phase, abs=1e-4)
 
 
 def test_drops_are_counted_over_restarts():

@@ -128,8 +128,8 @@ function onSample(one) {
   show('step', unit(one.step_ms, 1, 'ms'));
   show('left/right certainty', `${Math.round(100 * one.sure)} %`);
   show('frame', one.frame < 0 ? '–' : String(one.frame));
-  element('hand').removeAttribute('hidden');
-  element('hand').setAttribute('transform', `rotate(${360 * one.phase})`);
+  element('hand').toggleAttribute('hidden', one.phase === null);
+  if (one.phase !== null) element('hand').setAttribute('transform', `rotate(${360 * one.phase})`);
   waiting.push(one);
   if (waiting.length > KEPT) waiting.shift(); // while the page is hidden
   if (!scene) return;
