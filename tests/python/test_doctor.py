@@ -138,6 +138,10 @@ class Deaf:
         ("bogus://x", "fault lcm url: LCM_DEFAULT_URL: bogus://x"),
         ("file:///none/a.log", "fault lcm url: LCM_DEFAULT_URL: /none/a.log: no such LCM log; "),
         ("file:///none/a.log?mode=w", "fault lcm url: LCM_DEFAULT_URL: /none/a.log: folder /none does not "),
+        (
+            "file:///dev/shm/a.log?mode=bad",
+            "fault lcm url: LCM_DEFAULT_URL: file:///dev/shm/a.log?mode=bad: ",
+        ),
         ("udpm://239.255.76.67:7667?ttl=5", "note  lcm url: "),
         ("udpm://239.255.76.67:7667?recv_buf_size=4194304&ttl=1", "note  lcm url: "),
         ("udpm://239.255.76.67:7667?ttl=0", "ok    lcm url: "),

@@ -165,8 +165,10 @@ def _given_network(link: Any, url: str) -> Finding:
             link.open_lcm(url)
         elif mode == "r":
             link.require_log(path)
-        else:
+        elif mode:
             require_writable(path)
+        else:
+            raise UserError(f"{url}: LCM has no such mode; give ?mode=r, ?mode=w or ?mode=a")
     except UserError as error:
         text, _, remedy = str(error).rpartition("; ")
         return Finding("lcm url", "fault", f"LCM_DEFAULT_URL: {text}", f"{remedy}, or unset LCM_DEFAULT_URL")
