@@ -122,9 +122,11 @@ def press(page, on):
 
 def test_a_killed_recording_is_marked_when_the_page_is_opened_again(tmp_path, capfd):
     left = tmp_path / ".gait-20260102-030405-person-2.0123456789abcdef.log"
-    left.write_bytes(rig.write_log(tmp_path / "in.log", rig.frames(0, 1)).read_bytes())
+    left.write_bytes(rig.write_log(tmp_path / "in.log", rig.frames(0, 2)).read_bytes()[:-100])
     Page(0, [0], private_url(), tmp_path).close()
     assert {p.name for p in tmp_path.iterdir()} == {"in.log", "gait-20260102-030405-person-2.unfinished.log"}
+    whole = list(events_of(tmp_path / "gait-20260102-030405-person-2.unfinished.log"))
+    assert [event.channel for event in whole] == ["GAIT_IMAGE_0"]
     assert "was killed; what it wrote is in" in capfd.readouterr().err
 
 

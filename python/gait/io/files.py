@@ -30,12 +30,17 @@ class UnfinishedError(UserError):
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | None = None) -> Iterator[Path]:
+def replacing(
+    path: str | os.PathLike[str],
+    partial: Callable[[Path], bool] | None = None,
+    cut: Callable[[Path], bool] | None = None,
+) -> Iterator[Path]:
     """Yield a temporary file with the folder, suffix and mode of `path`; after success rename it to `path`.
 
     If `path` is a symbolic link, its target is written.  Two writers of one path do not disturb each other;
     the last one to finish wins.  A temporary file left by a killed command is renamed to
-    NAME.unfinished.SUFFIX.  Once the block has succeeded, the file is on the disk even if the power fails.
+    NAME.unfinished.SUFFIX; `cut` as in `recover`.  Once the block has succeeded, the file is on the disk even
+    if the power fails.
 
     `partial` is called with the temporary file if the block is interrupted, a disk is full, or the block
     raises `UnfinishedError`.  If it returns True, the file is worth keeping in that state, and is also
@@ -45,7 +50,7 @@ def replacing(path: str | os.PathLike[str], partial: Callable[[Path], bool] | No
     """
     require_writable(path)
     target = Path(os.path.realpath(path))
-    recover(target.parent, re.escape(target.stem), target.suffix)
+    recover(target.parent, re.escape(target.stem), target.suffix, cut)
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(8)}{target.suffix}")
     descriptor = -1
     try:
@@ -112,11 +117,13 @@ def require_unlocked(path: str | os.PathLike[str]) -> None:
                 lock(file.fileno(), path, fcntl.LOCK_SH)  # does not disturb others that only look
 
 
-def recover(folder: Path, stem: str, suffix: str) -> None:
+def recover(folder: Path, stem: str, suffix: str, cut: Callable[[Path], bool] | None = None) -> None:
     """Rename our files left by killed writers, and report them; remove those without contents.
 
-    `stem`: pattern of the names of outputs without their suffix.
+    `stem`: pattern of the names of outputs without their suffix; `cut`: cuts off what is incomplete at the
+    end of a file, and returns whether anything remains; tables (.csv) are cut to whole rows.
     """
+    cut = end_at_a_row if suffix == ".csv" else cut
     pattern = re.compile(rf"\.({stem})\.[0-9a-f]{{16}}{re.escape(suffix)}")
     try:
         names = [name for name in os.listdir(folder) if pattern.fullmatch(name)]
@@ -125,7 +132,7 @@ def recover(folder: Path, stem: str, suffix: str) -> None:
     for left in filter(_is_left, map(folder.joinpath, names)):
         target = folder / f"{pattern.fullmatch(left.name)[1]}{suffix}"  # type: ignore[index]
         with suppress(OSError):  # another command was faster
-            if left.stat().st_size == 0 or (target.suffix == ".csv" and not end_at_a_row(left)):
+            if left.stat().st_size == 0 or (cut is not None and not cut(left)):
                 left.unlink()
             else:
                 _keep(left, target, "the command that wrote it was killed; what it wrote")

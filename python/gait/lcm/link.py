@@ -307,7 +307,7 @@ def publisher(url: str) -> Iterator[lcm.LCM | LogWriter]:
     path, mode = log_of(url)
     if mode not in ("w", "a"):
         raise UsageError(f"--url {url}: names no log to write; add ?mode=w (new) or ?mode=a (at its end)")
-    named = nullcontext(path) if mode == "a" else replacing(path)
+    named = nullcontext(path) if mode == "a" else replacing(path, cut=end_at_an_event)
     with named as file, closing(LogWriter(file, mode, path)) as log:
         yield log
 

@@ -194,7 +194,7 @@ class Recorder:
         begun = time.monotonic()
         with ExitStack() as self._stack:
             if self._path is not None:
-                temporary = self._stack.enter_context(replacing(self._path, end_at_an_event))
+                temporary = self._stack.enter_context(replacing(self._path, end_at_an_event, end_at_an_event))
                 self._log = self._stack.enter_context(closing(LogWriter(temporary, name=self._path)))
             ended = False
             while not self.stop and not (ended := not handle(self._lcm, _TURN, not self._live)):

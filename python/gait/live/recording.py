@@ -119,7 +119,7 @@ def _write(log: LogWriter, channel: str, data: bytes) -> None:
 
 def recover_recordings(folder: str | Path) -> None:
     """Rename logs left by killed commands to ``gait-DATE-TIME.unfinished.log``, and report them."""
-    recover(Path(folder), r"gait-\d{8}-\d{6}(-\d+)?(-person-\d+)?", ".log")
+    recover(Path(folder), r"gait-\d{8}-\d{6}(-\d+)?(-person-\d+)?", ".log", end_at_an_event)
 
 
 @contextmanager
