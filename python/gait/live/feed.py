@@ -362,7 +362,9 @@ PLOTTED = (
 
 def _values(estimate: Estimate, angles: list[str]) -> list[float | None]:
     known = dict(zip(angles, np.degrees(estimate.angles).tolist(), strict=False))
-    known |= {"speed": float(estimate.speed), "phase": float(estimate.mean.phase)}
+    known["speed"] = float(estimate.speed)
+    if estimate.takes_strides:
+        known["phase"] = float(estimate.mean.phase)
     return [round(known[key], 3) if key in known else None for *_, key in PLOTTED]
 
 
