@@ -10,7 +10,7 @@ import pytest
 import gait.cli
 from gait import Estimate, Flag, Frame, Model, State, TrackStatus, UserError
 from gait.body.skeleton import EVAL15, JOINTS
-from gait.io.track_file import TrackWriter, read_track, read_truth
+from gait.io.track_file import TrackWriter, fault_of, read_track, read_truth
 from gait.io.trc import write_trc
 from gait.motion.parameters import write_rows
 
@@ -219,6 +219,28 @@ def test_damaged_tracks_are_reported(change, words, tmp_path):
     spoil(tmp_path / "t.csv", change)
     with pytest.raises(UserError, match=f"t.csv: {words}"):
         read_track(tmp_path / "t.csv")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"joints": (4, 1)}, f"{MODEL.joint_names[4]}_y is nan"),
+        ({"joint_sd": (18, 2)}, f"{MODEL.joint_names[18]}_sz is nan"),
+        ({"angles": 6}, "angle_deg 7 is nan"),
+        ({"coef": 2}, "c_3 is nan"),
+        ({"pelvis": 1}, "pelvis_y of the state is nan"),
+        ({"heading": None}, "heading_rad is nan"),
+    ],
+)
+def test_the_number_that_cannot_be_is_named(change, words):
+    one = estimate(0)
+    assert fault_of(one) is None
+    ((name, at),) = change.items()
+    if at is None:
+        one.mean.heading = np.nan
+    else:
+        getattr(one if hasattr(one, name) else one.mean, name)[at] = np.nan
+    assert fault_of(one) == words
 
 
 def test_more_than_a_million_particles_can_be_read_back(tmp_path):

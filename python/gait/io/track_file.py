@@ -96,8 +96,19 @@ def fault_of(estimate: Estimate) -> str | None:
         columns |= {"phase_sd": [sd.phase], "stride_hz_sd": [sd.stride_hz]}
     for name, values in columns.items():
         if (fault := fault_in(name, values)) is not None:
-            return f"{name} is {np.ravel(values)[fault[0]]:g}"
+            return f"{_entry(estimate, name, fault[0])} is {np.ravel(values)[fault[0]]:g}"
     return None
+
+
+def _entry(estimate: Estimate, first: str, k: int) -> str:
+    """Name the `k`-th number of those that begin with the column `first` in `fault_of`."""
+    if first.startswith("joint_"):
+        return f"{estimate.joint_names[k // 3]}_{first.removeprefix('joint_')[:-1]}{'xyz'[k % 3]}"
+    if first == "pelvis_x":
+        return f"pelvis_{'xyz'[k]} of the state"
+    if first.startswith("c_1"):
+        return first.replace("1", str(k + 1))
+    return f"{first} {k + 1}" if first in ("angle_deg", "class_probability") else first
 
 
 def require_joints(names: Sequence[str]) -> None:
