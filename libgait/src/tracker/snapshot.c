@@ -81,39 +81,35 @@ static bool flag(int32_t x)
     return x == 0 || x == 1;
 }
 
-static bool core_plausible(const gait_tracker *t, const unsigned char *body)
+static bool core_plausible(const gait_tracker *t, const tracker_core *c)
 {
-    tracker_core c;
-    memcpy(&c, body, sizeof c);
-    bool ok = c.generation >= 0 && c.generation < t->history.depth && flag(c.started);
-    ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->capacity && c.below_capacity >= 0 &&
-          c.below_capacity < t->capacity;
-    ok &= c.below_config >= 0 && c.below_config <= t->config_particles - 16;
-    const hypotheses_state *const h = &c.hypotheses;
-    ok &= h->stage >= HYPOTHESES_ONE && h->stage <= HYPOTHESES_TWO && h->since <= c.utime &&
-          h->since >= c.start_utime;
+    bool ok = c->generation >= 0 && c->generation < t->history.depth && flag(c->started);
+    ok &= c->ess >= 0.0 && c->ess <= 2.0 * (double)t->capacity && c->below_capacity >= 0 &&
+          c->below_capacity < t->capacity;
+    ok &= c->below_config >= 0 && c->below_config <= t->config_particles - 16;
+    const hypotheses_state *const h = &c->hypotheses;
+    ok &= h->stage >= HYPOTHESES_ONE && h->stage <= HYPOTHESES_TWO && h->since <= c->utime &&
+          h->since >= c->start_utime;
     ok &= flag(h->left_right_known) && flag(h->phase_known) && flag(h->agreed);
     ok &= fabs(h->log_odds) < 1e6 && fabs(h->recent_log_ratio) < 1e12; /* false for NaN */
-    ok &= c.start_utime <= c.utime && (uint64_t)c.utime - (uint64_t)c.start_utime < LONGEST_AGE;
-    ok &= c.frame < LONGEST_AGE && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
-    ok &= c.rejuvenation_utime <= c.utime && c.rejuvenation_utime >= c.start_utime;
-    ok &= c.usual_unexplained >= 0.0f && c.usual_unexplained < 1e9f && c.stature_sd_ratio >= 0.0f &&
-          c.stature_sd_ratio < 1e9f;
-    ok &= f_finite(&c.front_back_margin, 1) && f_finite(&c.fit_margin, 1);
-    ok &= fabsf(c.left_right_margin) <= REPORT_LOG_ODDS;
+    ok &= c->start_utime <= c->utime && (uint64_t)c->utime - (uint64_t)c->start_utime < LONGEST_AGE;
+    ok &= c->frame < LONGEST_AGE && c->support_utime <= c->utime && c->support_utime >= c->start_utime;
+    ok &= c->rejuvenation_utime <= c->utime && c->rejuvenation_utime >= c->start_utime;
+    ok &= c->usual_unexplained >= 0.0f && c->usual_unexplained < 1e9f && c->stature_sd_ratio >= 0.0f &&
+          c->stature_sd_ratio < 1e9f;
+    ok &= f_finite(&c->front_back_margin, 1) && f_finite(&c->fit_margin, 1);
+    ok &= fabsf(c->left_right_margin) <= REPORT_LOG_ODDS;
     for (int32_t k = 0; k < t->cfg.cameras; k++) {
-        const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};
+        const float map[3] = {c->map[k].scale, c->map[k].u0, c->map[k].v0};
         ok &= moderate(map, 3) && map[0] >= 0.0f && map[0] <= 2.0f;
     }
     return ok;
 }
 
-static bool weights_plausible(const gait_tracker *t, const unsigned char *body)
+static bool weights_plausible(const gait_tracker *t, const unsigned char *body, const tracker_core *c)
 {
-    tracker_core c;
     double sum = 0.0;
-    memcpy(&c, body, sizeof c);
-    for (int32_t i = 0; i < t->capacity - c.below_capacity; i++) {
+    for (int32_t i = 0; i < t->capacity - c->below_capacity; i++) {
         double weight, log_weight;
         int32_t parent;
         memcpy(&weight, in_body(t, body, &t->filter.weight[i]), sizeof weight);
@@ -128,15 +124,13 @@ static bool weights_plausible(const gait_tracker *t, const unsigned char *body)
 }
 
 /* What the steps since the start have recorded; older slots are not read. */
-static bool records_plausible(const gait_tracker *t, const unsigned char *body)
+static bool records_plausible(const gait_tracker *t, const unsigned char *body, const tracker_core *c)
 {
     const particle_history *const h = &t->history;
-    tracker_core c;
-    memcpy(&c, body, sizeof c);
-    for (int32_t k = 0; k < h->depth && (uint64_t)k < c.frame; k++) {
+    for (int32_t k = 0; k < h->depth && (uint64_t)k < c->frame; k++) {
         generation_record r;
-        memcpy(&r, in_body(t, body, &h->record[history_slot(h, c.generation, k)]), sizeof r);
-        if (r.age < 0 || r.age > c.utime - c.start_utime || r.frame > c.frame ||
+        memcpy(&r, in_body(t, body, &h->record[history_slot(h, c->generation, k)]), sizeof r);
+        if (r.age < 0 || r.age > c->utime - c->start_utime || r.frame > c->frame ||
             !(fabs(r.log_evidence) < 1e300) || r.status < GAIT_TRACK_INIT || r.status > GAIT_TRACK_LOST)
             return false;
     }
@@ -179,22 +173,21 @@ static bool strata_plausible(const gait_tracker *t, const strata *s, int32_t n)
     return ok && s->first[s->count] == n;
 }
 
-static bool classes_plausible(const gait_tracker *t, const unsigned char *body)
+static bool classes_plausible(const gait_tracker *t, const unsigned char *body, const tracker_core *c)
 {
     const particle_history *const h = &t->history;
     uint32_t const classes = (uint32_t)t->model->classes;
-    tracker_core c;
     class_state s;
-    memcpy(&c, body, sizeof c);
-    if (!t->classes || !c.started)
+    if (!t->classes || !c->started)
         return true;
     memcpy(&s, in_body(t, body, t->classes), sizeof s);
     bool ok = (uint32_t)s.reported < classes && (uint32_t)s.supported < classes &&
               (uint32_t)s.moved_class < classes && s.resampled >= 0 &&
-              s.resampled <= c.utime - c.start_utime && s.moved >= 0 && s.moved <= c.utime - c.start_utime &&
+              s.resampled <= c->utime - c->start_utime && s.moved >= 0 &&
+              s.moved <= c->utime - c->start_utime &&
               moderate(s.score[0], GAIT_MAX_CLASSES * GAIT_MAX_COMPONENTS) && moderate(s.drift, 2);
-    for (int32_t k = 0; ok && k < h->depth && ((uint64_t)k < c.frame || k == 0); k++) {
-        int32_t const slot = history_slot(h, c.generation, k);
+    for (int32_t k = 0; ok && k < h->depth && ((uint64_t)k < c->frame || k == 0); k++) {
+        int32_t const slot = history_slot(h, c->generation, k);
         int32_t count;
         strata of;
         memcpy(&count, in_body(t, body, &h->count[slot]), sizeof count);
@@ -249,9 +242,11 @@ gait_result snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
     if (h.bytes != bytes || bytes != snapshot_bytes(t) || h.body != hash_state(body, state_bytes(t)))
         return base_fail(err, GAIT_ERR_CORRUPT, -1,
                          "snapshot is damaged: its length or checksum does not match");
-    if (!core_plausible(t, body) || !weights_plausible(t, body) || !records_plausible(t, body) ||
-        !history_plausible(t, body) || !classes_plausible(t, body) || !template_plausible(t, body) ||
-        !walk_check_plausible(t, body))
+    tracker_core core;
+    memcpy(&core, body, sizeof core);
+    if (!core_plausible(t, &core) || !weights_plausible(t, body, &core) ||
+        !records_plausible(t, body, &core) || !history_plausible(t, body) ||
+        !classes_plausible(t, body, &core) || !template_plausible(t, body) || !walk_check_plausible(t, body))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot contains a number outside its range");
     memcpy(t->core, body, state_bytes(t));
     tracker_set_count(t, t->capacity - t->core->below_capacity);
