@@ -3,6 +3,11 @@
 #define LN2_HI 6.93147180369123816490e-01 /* 33 bits: its product with an exponent is exact */
 #define LN2_LO 1.90821492927058770002e-10
 
+float m_wrap_pi_one(float x)
+{
+    return m_wrap_pi(x);
+}
+
 static double from_bits64(uint64_t u)
 {
     double x;

@@ -66,6 +66,8 @@ static inline float m_wrap_pi(float x)
     return f_clamp(r - turn, -PI_F, PI_F);
 }
 
+float m_wrap_pi_one(float x); /* the same, not inlined */
+
 /* Relative error < 1e-7.  Below -87.3 and for NaN: 0; above 88: exp(88). */
 static inline float m_exp(float x)
 {

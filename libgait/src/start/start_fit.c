@@ -36,7 +36,7 @@ static void place_states(const gait_start *s, const double (*theta)[N], int32_t 
     for (int32_t i = 0; i < BLOCK; i++) {
         const double *const q = theta[i_min(i, lanes - 1)];
         float sn, cs;
-        float const heading = m_wrap_pi((float)q[START_HEADING]), way = (float)(q[START_SPEED] * at);
+        float const heading = m_wrap_pi_one((float)q[START_HEADING]), way = (float)(q[START_SPEED] * at);
         m_sincos_one(heading, &sn, &cs);
         b->f[F_PHASE][i] = m_wrap1((float)(q[START_PHASE] + q[START_RATE] * at));
         b->f[F_RATE][i] = f_clamp((float)q[START_RATE], 0.1f, 4.0f);
@@ -289,8 +289,8 @@ static bool same(const start_candidate *a, const start_candidate *b, bool boxes)
 {
     if (boxes && a->in_place && b->in_place)
         return true;
-    float const turn = m_wrap_pi((float)(a->theta[START_HEADING] - b->theta[START_HEADING]));
-    float const phase = m_wrap_pi(TWO_PI_F * (float)(a->theta[START_PHASE] - b->theta[START_PHASE]));
+    float const turn = m_wrap_pi_one((float)(a->theta[START_HEADING] - b->theta[START_HEADING]));
+    float const phase = m_wrap_pi_one(TWO_PI_F * (float)(a->theta[START_PHASE] - b->theta[START_PHASE]));
     return a->in_place == b->in_place && fabsf(turn) < 0.3f && fabsf(phase) < 0.6f;
 }
 

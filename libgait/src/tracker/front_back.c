@@ -35,7 +35,7 @@ static void turned_bodies(const particle_state *p, particle_block *out)
         particle_state one = *p;
         if (lane > 0) {
             one.f[F_PHASE] = m_wrap1(p->f[F_PHASE] + (float)lane / (float)(BLOCK - 1));
-            one.f[F_HEADING] = m_wrap_pi(p->f[F_HEADING] + PI_F);
+            one.f[F_HEADING] = m_wrap_pi_one(p->f[F_HEADING] + PI_F);
         }
         particle_put(&all, lane, &one);
     }

@@ -265,7 +265,7 @@ static float reflected_heading(const gait_tracker *t, const particle_state *p)
 {
     float to[3];
     camera_to(&t->cfg.camera[0], p->f + F_X, to);
-    return m_wrap_pi(2.0f * m_atan2(to[1], to[0]) + PI_F - p->f[F_HEADING]);
+    return m_wrap_pi_one(2.0f * m_atan2(to[1], to[0]) + PI_F - p->f[F_HEADING]);
 }
 
 /* The other reading of the same image.  Every second particle also swaps near and far where that turns the person by less
@@ -275,7 +275,7 @@ static particle_state other_hypothesis(const gait_tracker *t, const particle_sta
     const state_layout *const of = layout_at(t, i);
     particle_state to = mirror_apply(&t->mirror[of->model->motion_class], of, p);
     float const heading = reflected_heading(t, p);
-    if ((i & 1) && fabsf(m_wrap_pi(heading - p->f[F_HEADING])) < 0.5f * PI_F)
+    if ((i & 1) && fabsf(m_wrap_pi_one(heading - p->f[F_HEADING])) < 0.5f * PI_F)
         to.f[F_HEADING] = heading;
     return to;
 }
@@ -290,7 +290,7 @@ static void jitter(const gait_tracker *t, int32_t i, particle_state *p)
         p->f[F_COEF + k] += JITTER_SCORE * n[k % 4];
     }
     rng_normal4(t->cfg.seed, STREAM_SPLIT, 0, (uint32_t)i, 0, n);
-    p->f[F_HEADING] = m_wrap_pi(p->f[F_HEADING] + JITTER_HEADING * n[0]);
+    p->f[F_HEADING] = m_wrap_pi_one(p->f[F_HEADING] + JITTER_HEADING * n[0]);
     p->f[F_RATE] *= 1.0f + JITTER_RATE * n[1];
     p->f[F_PHASE] = m_wrap1(p->f[F_PHASE] + JITTER_PHASE * n[2]);
 }
@@ -327,7 +327,7 @@ static void split_range(void *ctx, int32_t begin, int32_t end, int32_t task)
     for (int32_t i = begin; i < end; i++) {
         bool const second = i >= hypothesis_first(j->particles.n, 1);
         particle_state p = particle_get(&j->particles, i);
-        bool const far = fabsf(m_wrap_pi(TWO_PI_F * (p.f[F_PHASE] - j->phase))) > 0.5f * PI_F;
+        bool const far = fabsf(m_wrap_pi_one(TWO_PI_F * (p.f[F_PHASE] - j->phase))) > 0.5f * PI_F;
         if (still(j->t, i))
             continue;
         if (far != second)

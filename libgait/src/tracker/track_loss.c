@@ -125,7 +125,7 @@ static bool phase_as_predicted(const gait_tracker *t, float gap, const state_lay
     float const turn = in_walking_time(t, gap) * last->f[F_RATE] * (float)direction;
     if (direction != of->model->direction)
         return false;
-    float const off = m_wrap_pi(TWO_PI_F * (mean->f[F_PHASE] - last->f[F_PHASE] - turn)) / TWO_PI_F;
+    float const off = m_wrap_pi_one(TWO_PI_F * (mean->f[F_PHASE] - last->f[F_PHASE] - turn)) / TWO_PI_F;
     return gap < PHASE_TIME && fabsf(off) < PHASE_WITHIN;
 }
 

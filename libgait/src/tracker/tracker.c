@@ -50,7 +50,7 @@ static gait_state as_class(const gait_tracker *t, const gait_state *s, int32_t m
                                                                          t->layouts[motion_class].model;
     particle_state const p = particle_from_state(&t->layouts[s->motion_class], s);
     if (was->direction * is->direction < 0 && front_back_visible(t, &p)) {
-        to.heading = m_wrap_pi(s->heading + PI_F);
+        to.heading = m_wrap_pi_one(s->heading + PI_F);
         to.phase = m_wrap1(0.5f - s->phase);
     }
     to.motion_class = motion_class;
@@ -319,7 +319,7 @@ static gait_track_status status_of(const gait_tracker *t, float dt, const gait_e
     float const predicted = core->reported_phase + in_walking_time(t, dt) * core->reported_rate;
     bool const departs =
         !(t->classes && (e->motion_class != t->classes->reported || still)) &&
-        fabsf(m_wrap_pi(TWO_PI_F * (e->mean.phase - predicted))) > TWO_PI_F * PHASE_DEPARTURE;
+        fabsf(m_wrap_pi_one(TWO_PI_F * (e->mean.phase - predicted))) > TWO_PI_F * PHASE_DEPARTURE;
     if (track_loss_is_lost(t))
         return GAIT_TRACK_LOST;
     if (hypotheses_acquiring(t) || !core->found)
