@@ -435,5 +435,5 @@ def test_joints_are_measured_as_well_before_a_film_ends(smooth, tmp_path, monkey
         off = [track.places[name] - truth.places[name][track.frame] for name in names]
         errors[film] = np.linalg.norm(off, axis=2).mean(axis=0)
     last = slice(half - 6, half)  # 0.2 s, whose surroundings have frames of one camera
-    # The smoother has frames of one camera after them; without the second film errors are over twice as large.
+    # The smoother has frames of one camera after them; without the second film errors are twice as large.
     assert errors["short.mp4"][last].mean() < 1.25 * errors["video_2.mp4"][last].mean()
