@@ -38,8 +38,9 @@ def words(tmp_path):
 
 
 def run(words, layer, done, fault, at=0):
-    """Run with one fault; the process, and whether the fault came."""
-    done.unlink(missing_ok=True)
+    """Run with one fault, without the outputs of earlier runs; the process, and whether the fault came."""
+    for left in [done, *done.parent.glob("out.*")]:
+        left.unlink(missing_ok=True)
     ended = subprocess.run(
         words,
         capture_output=True,
