@@ -117,7 +117,7 @@ class Follower:
         Estimates of frames before a start come from the tracker running backwards from it.
         """
         start = self._settled(start, frames)
-        given, before = self._earlier(start, frames)
+        given, before = self._earlier(start, frames, frames.stop)
         first, before = self._first(given, before, frames)
         following: Start | None = first
         now: Estimate | None = None
@@ -138,7 +138,7 @@ class Follower:
                 stop = frames.stop if following is None else following.frame
                 found = self._find_again(frame.number + 1, stop, now.mean.stature)
                 if found is not None:
-                    following, more = self._earlier(found, range(frame.number + 1, stop))
+                    following, more = self._earlier(found, range(frame.number + 1, frames.stop), stop)
                     before |= more
             estimate = replace(now, status=TrackStatus.LOST) if lost else now
             yield frame, before.get(frame.number, estimate) if lost else estimate
@@ -160,16 +160,17 @@ class Follower:
         self._uncertain = bool(found) and (len(found) < 2 or min(agreeing) < len(found))
         return found[int(np.argmax(agreeing))].start if found else start
 
-    def _sided(self, start: Start, frames: range) -> Start:
+    def _sided(self, start: Start, frames: range, stop: int) -> Start:
         """Decide left and right of a start with a known phase that was found in the clip.
 
         Its keypoints may be swapped throughout the second from which it was found, so the tracker leaves the
-        sides open; one draw of particles decides.
+        sides open; one draw of particles decides.  The start is before frame `stop`.
         """
         if not start.hypotheses or start.sd.phase >= _OPEN_PHASE:
             return start
         decided = self._draw(start, frames, 0)
-        return start if decided is None else _with_side(start, decided)
+        found = start if decided is None else _with_side(start, decided)
+        return found if found.frame < stop else start
 
     def _draw(self, start: Start, frames: range, draw: int) -> Decided | None:
         """Return where one draw of particles has decided; None if it does not soon."""
@@ -219,7 +220,7 @@ class Follower:
         found = self._find_again(frames.start, stop, start.mean.stature)
         if found is None:
             return start, before
-        found, more = self._earlier(found, range(frames.start, stop))
+        found, more = self._earlier(found, frames, stop)
         return found, before | more
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
@@ -241,9 +242,9 @@ class Follower:
             tracker.start(start.mean, start.sd, utime)
         self._plausibility.restart()
 
-    def _earlier(self, start: Start, frames: range) -> tuple[Start, dict[int, Estimate]]:
-        """Return where to start, and the estimates of the frames from the first of `frames` to there."""
-        start = self._sided(start, frames)
+    def _earlier(self, start: Start, frames: range, stop: int) -> tuple[Start, dict[int, Estimate]]:
+        """Return where to start, before frame `stop`, and estimates from the first of `frames` to there."""
+        start = self._sided(start, frames, stop)
         before = self._backwards(start, frames.start) if frames.start < start.frame else {}
         if not self._one_pass:
             return start, before
