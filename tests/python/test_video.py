@@ -146,9 +146,8 @@ def test_cut_off_video_is_reported(film, tmp_path):
         list(Video(path).frames())
 
 
-@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
-def test_a_film_that_breaks_off_names_the_last_frame(suffix, film, tmp_path):
-    whole, cut = tmp_path / f"whole.{suffix}", tmp_path / f"cut.{suffix}"
+def break_off(film, whole, cut):
+    """Write a film that begins with its index, and the same without the frames from the ninth on."""
     with av.open(str(film)) as source, av.open(str(whole), "w", options={"movflags": "faststart"}) as target:
         stream = target.add_stream_from_template(source.streams.video[0])
         for packet in source.demux(video=0):
@@ -158,22 +157,19 @@ def test_a_film_that_breaks_off_names_the_last_frame(suffix, film, tmp_path):
     with av.open(str(whole)) as container:
         ninth = [packet.pos for packet in container.demux(video=0) if packet.size][8]
     cut.write_bytes(whole.read_bytes()[:ninth])
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
+def test_a_film_that_breaks_off_names_the_last_frame(suffix, film, tmp_path):
+    whole, cut = tmp_path / f"whole.{suffix}", tmp_path / f"cut.{suffix}"
+    break_off(film, whole, cut)
     assert Video(whole).broken is None
     assert f"cut.{suffix}: breaks off after frame 8 of 12" in Video(cut).broken
 
 
 def spoil(film, path, monkeypatch):
     """Write a film that states frames which it lacks, and of which the decoder calls the third damaged."""
-    whole = path.with_suffix(".whole.mp4")
-    with av.open(str(film)) as source, av.open(str(whole), "w", options={"movflags": "faststart"}) as target:
-        stream = target.add_stream_from_template(source.streams.video[0])
-        for packet in source.demux(video=0):
-            packet.stream = stream
-            if packet.dts is not None:
-                target.mux(packet)
-    with av.open(str(whole)) as container:
-        ninth = [packet.pos for packet in container.demux(video=0) if packet.size][8]
-    path.write_bytes(whole.read_bytes()[:ninth])
+    break_off(film, path.with_suffix(".whole.mp4"), path)
     decode = Video._decode
 
     def spoilt(self, stop):
