@@ -7,8 +7,10 @@ The clips are presets of `gait simulate`, with further seeds of the person; the 
 `eval_simulated`; and the development clips.  The models are those of the package: walk; classes, which walks,
 stands, walks backwards and runs; and, where people only walk, the walk of classes alone, which is learnt from
 people of seven sources instead of CMU's.  A start is the truth with the noise of `eval_clips`; it does not
-state the class.  The outdoor film is judged by joints marked in the picture.  The time of a step is compared
-between the package's walk, the same walk with standing and walking backwards added, and classes.
+state the class.  Clips of `gait simulate` are also tracked as users do it, by `gait track -m classes` with
+the detector and an automatic start, and with --smooth.  The outdoor film is judged by joints marked in the
+picture.  The time of a step is compared between the package's walk, the same walk with standing and walking
+backwards added, and classes.
 """
 
 from __future__ import annotations
@@ -41,7 +43,7 @@ from gait.bindings.model import read_cyclic
 from gait.body.motion_classes import of_class
 from gait.body.skeleton import EVAL15
 from gait.io import blob
-from gait.io.track_file import Joints, read_truth
+from gait.io.track_file import Joints, read_estimates, read_truth
 from gait.io.video import read_plate
 from gait.motion.evaluate import coverage, phase_errors
 from gait.motion.footfalls import strikes_of
@@ -53,6 +55,10 @@ ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "eval-classes"
 MODELS = "walk", "classes"  # of the package
 ALONE = "walk of classes"
+USERS = {
+    "classes, users": (),
+    "classes, --smooth": ("--smooth",),
+}  # further options of `gait track -m classes`
 RUNNING = "running"  # clip of eval_simulated
 TIMED = "walk"  # a clip that all models follow: a tracker that searches for a person has twice the particles
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
@@ -95,7 +101,8 @@ _READING = f"""\
 Clips of `gait simulate`, and the development clips (names with a number), whose people are among those that
 all models were learnt from.  The start is the truth with noise and does not state the class, so people who
 stand or walk backwards are tracked as walking for the first frames.  {ALONE}: the same model without its
-other classes.
+other classes.  {" and ".join(USERS)}: as users track, with `gait track -m classes`, the camera, the
+detector and an automatic start, without and with --smooth; errors are those of the frames in the track.
 
 - root: error with the hips aligned, median over frames, then over seeds; abs: error without alignment
 - verdict, of the clips of `gait simulate`: reached, or what misses its target
@@ -157,7 +164,7 @@ def main() -> None:
     args = parser.parse_args()
     clips = _clips(args.only)
     runs: list[Run] = []
-    with progress("tracking", args.seeds * sum(len(MODELS) + _walks(clip) for clip in clips)) as update:
+    with progress("tracking", args.seeds * sum(len(_sources(clip)) for clip in clips)) as update:
         for run in _runs(clips, args.seeds, args.jobs):
             runs.append(run)
             update(len(runs))
@@ -191,21 +198,71 @@ def _runs(clips: list[Clip], seeds: int, jobs: int) -> Iterator[Run]:
     alone = OUT / f"{ALONE}.gait"
     blob.write(alone, {tag: of for tag, of in read_cyclic("classes").items() if not of_class(tag)})
     each = [
-        (clip, name, seed)
-        for clip in clips
-        for name in (*MODELS, *([str(alone)] if _walks(clip) else []))
-        for seed in range(1, seeds + 1)
+        (clip, source, seed) for clip in clips for source in _sources(clip) for seed in range(1, seeds + 1)
     ]
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         yield from pool.map(_run, *zip(*each, strict=True))
 
 
-def _walks(clip: Clip) -> bool:
-    """Whether the person only walks forwards."""
-    return clip.name != RUNNING and (clip.name not in CLIPS or CLIPS[clip.name].motion in ("walk", "turn"))
+def _sources(clip: Clip) -> list[str]:
+    """What a clip is tracked with: names or paths of models, and keys of `USERS`."""
+    walks = clip.name != RUNNING and (clip.name not in CLIPS or CLIPS[clip.name].motion in ("walk", "turn"))
+    alone = [str(OUT / f"{ALONE}.gait")] if walks else []
+    return [*MODELS, *alone, *(USERS if _simulated(clip.name) else ())]
+
+
+def _simulated(clip: str) -> bool:
+    """Whether `gait simulate` made the clip of a name."""
+    return clip == RUNNING or clip in CLIPS
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What a tracker reported, for n frames of a clip."""
+
+    frame: NDArray[np.int64]  #: (n,)
+    places: NDArray[np.float64]  #: (n, 15, 3) EVAL15, metres
+    sd: NDArray[np.float64]  #: (n, 15, 3)
+    tracking: NDArray[np.bool_]  #: (n,) status
+    motion_class: list[str]
+    phase: NDArray[np.float64]  #: (n,) NaN while the person stands
 
 
 def _run(clip: Clip, source: str, seed: int) -> Run:
+    """Track a clip and measure the errors."""
+    followed = _as_users(clip, source, seed) if source in USERS else _from_truth(clip, source, seed)
+    truth = read_truth(clip.truth)
+    count, shown = len(truth.frame), followed.frame
+    every = np.array(_classes(clip.truth, count))
+    changed = np.maximum.accumulate(np.where(np.append(True, every[1:] != every[:-1]), np.arange(count), 0))
+    since, classes = (np.arange(count) - changed)[shown], every[shown]
+    late = (changed[shown] > 0) & (since * np.median(np.diff(truth.time)) < DELAY)
+    reported = np.array(followed.motion_class)
+    wrong = (reported != classes) & ~late
+    off = followed.places - truth.eval15()[shown]
+    absolute = np.linalg.norm(off, axis=2).mean(axis=1)
+    root = np.linalg.norm(off - off[:, HIPS].mean(axis=1, keepdims=True), axis=2).mean(axis=1)
+    under = followed.tracking
+    frames = max(int(under.sum()), 1)
+    judged = under & (classes != STANDING) & (reported != STANDING)
+    return Run(
+        clip.name,
+        Path(source).stem,
+        seed,
+        1000 * float(np.median(root)),
+        1000 * float(np.median(absolute)),
+        coverage(followed.places, followed.sd, truth.eval15()[shown])["90"],
+        float(under.sum() / count),
+        float((root > FAR)[under].sum() / frames),
+        float(wrong[under].sum() / frames) if Path(source).stem not in (MODELS[0], ALONE) else None,
+        phase_errors(followed.phase[judged], _phases(clip, truth)[shown][judged])["flips"]
+        if judged.any()
+        else None,
+        foot_speed(followed, truth, every != STANDING),
+    )
+
+
+def _from_truth(clip: Clip, source: str, seed: int) -> Followed:
     """Track a clip from the truth with noise."""
     model, name = Model(source), Path(source).stem
     video = Video(clip.video)
@@ -214,63 +271,57 @@ def _run(clip: Clip, source: str, seed: int) -> Run:
     tracker = Tracker(model, camera, TrackerConfig.default(seed=seed), background=plate)
     init = OUT / f"{clip.name}.{name}.{seed}.json"
     init.write_text(json.dumps(eval_clips.noisy_start(clip, seed, 0.0)))
-    start, truth = Start.read(init, model), read_truth(clip.truth)
-    joints, classes = truth.eval15(), _classes(clip.truth, len(truth.frame))
-    changed = np.maximum.accumulate(
-        np.where(
-            np.append(True, np.array(classes[1:]) != np.array(classes[:-1])),
-            np.arange(len(classes)),
-            0,
-        )
-    )
-    phases = _phases(clip, truth)
-    root, absolute, tracked, wrong, inside, places, phase, moves = [], [], [], [], [], [], [], []
+    start = Start.read(init, model)
+    at = [model.joint_names.index(joint) for joint in EVAL15]
+    rows = []
     for i, frame in enumerate(video.frames()):
         if i == 0:
             tracker.start(start.mean, start.sd, frame.utime)
         estimate = tracker.step(frame.image, frame.utime)
-        found = np.array([estimate.joint(joint) for joint in EVAL15])
-        sd = estimate.joint_sd[[model.joint_names.index(joint) for joint in EVAL15]]
-        inside.append(coverage(found, sd, joints[i])["90"])
-        places.append(found)
-        moves.append(STANDING not in (classes[i], estimate.motion_class))
-        phase.append(estimate.mean.phase)
-        off = found - joints[i]
-        absolute.append(np.linalg.norm(off, axis=1).mean())
-        root.append(np.linalg.norm(off - off[HIPS].mean(axis=0), axis=1).mean())
-        tracked.append(estimate.status == TrackStatus.TRACKING)
-        late = changed[i] > 0 and i - changed[i] < DELAY * video.fps
-        wrong.append(estimate.motion_class != classes[i] and not late)
-    under = np.array(tracked)
-    count = max(int(under.sum()), 1)
-    judged = under & np.array(moves)
-    return Run(
-        clip.name,
-        name,
-        seed,
-        1000 * float(np.median(root)),
-        1000 * float(np.median(absolute)),
-        float(np.mean(inside)),
-        float(under.mean()),
-        float((np.array(root) > FAR)[under].sum() / count),
-        float(np.array(wrong)[under].sum() / count) if len(model.classes) > 1 else None,
-        phase_errors(np.array(phase)[judged], phases[judged])["flips"] if judged.any() else None,
-        foot_speed(np.array(places), truth, np.array(classes) != STANDING),
+        rows.append(
+            (
+                [estimate.joint(joint) for joint in EVAL15],
+                estimate.joint_sd[at],
+                estimate.status == TrackStatus.TRACKING,
+                estimate.motion_class,
+                estimate.mean.phase,
+            )
+        )
+    places, sd, tracking, classes, phase = zip(*rows, strict=True)
+    return Followed(
+        np.arange(len(rows)),
+        np.array(places),
+        np.array(sd),
+        np.array(tracking),
+        list(classes),
+        np.array(phase),
     )
 
 
-def foot_speed(places: NDArray[np.float64], truth: Joints, moves: NDArray[np.bool_]) -> float | None:
+def _as_users(clip: Clip, source: str, seed: int) -> Followed:
+    """Track a clip with `gait track -m classes`, as in `USERS`."""
+    out = OUT / f"{clip.name}.{'smooth' if USERS[source] else 'users'}.{seed}.csv"
+    words = ["track", clip.video, "--camera", clip.camera, "-m", "classes", "--seed", seed, "-o", out]
+    subprocess.run(
+        [sys.executable, "-m", "gait", *map(str, words), *USERS[source]], check=True, capture_output=True
+    )
+    track = read_estimates(out)
+    under = np.array([status == "tracking" for status in track.status])
+    return Followed(track.frame, track.eval15(), track.eval15_sd(), under, track.motion_class, track.phase)
+
+
+def foot_speed(followed: Followed, truth: Joints, moves: NDArray[np.bool_]) -> float | None:
     """Median speed over the ground (m/s) of the ankle of the foot that stands.
 
-    `places`: tracked positions of EVAL15, (n, 15, 3) metres; `moves`: frames (n,) that count.  None: no foot
-    stands in any.
+    `moves`: frames of the truth (n,) that count.  None: no foot stands in any.
     """
-    seconds = np.diff(truth.time)[:, None]
+    shown = followed.frame
+    seconds = np.diff(truth.time[shown])[:, None]
     tracked, true = (
         np.linalg.norm(np.diff(ankles[:, ANKLES, :2], axis=0), axis=2) / seconds
-        for ankles in (places, truth.eval15())
+        for ankles in (followed.places, truth.eval15()[shown])
     )
-    stands = (true < STANCE) & moves[1:, None]
+    stands = (true < STANCE) & moves[shown][1:, None]
     return float(np.median(tracked[stands])) if stands.any() else None
 
 
@@ -373,7 +424,7 @@ def _rows(runs: list[Run]) -> Iterator[tuple[object, ...]]:
 
 def _verdict(clip: str, runs: list[Run]) -> str | None:
     """Name the targets that the runs of a clip with one model miss; None: the clip has no target."""
-    if clip != RUNNING and clip not in CLIPS:
+    if not _simulated(clip):
         return None
     wrong = [run.wrong for run in runs if run.wrong is not None]
     covered = float(np.mean([run.covered for run in runs]))
