@@ -60,7 +60,7 @@ typedef struct gait_box { GAIT_BOX_FIELDS(GAIT_DECLARE) } gait_box;
           gait_state, sd, , "")                                                                                       \
     FIELD("Correlation of phase, stride_hz, stature, heading, pelvis x and y; all 0: independent.",                  \
           float, correlation, [6][6], "")                                                                             \
-    FIELD("Speed along the heading.",                                                                                 \
+    FIELD("Speed in the direction of the class of motion: against the heading if it is backwards.",                   \
           float, speed, , "metres per second")                                                                        \
     FIELD("Its standard deviation.",                                                                                  \
           float, speed_sd, , "metres per second")                                                                     \

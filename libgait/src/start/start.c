@@ -34,7 +34,7 @@ static double height_of(const gait_start *s, int32_t point)
         w->states.f[F_RATE][i] = s->model->stride_hz;
         w->states.f[F_STATURE][i] = s->model->stature_mean;
     }
-    particle_block_bodies(&s->layout, &w->states, &w->body);
+    particle_block_bodies(&s->layout[0], &w->states, &w->body);
     kin_points(s->model, &w->body, w->points);
     for (int32_t i = 0; i < BLOCK; i++)
         sum += (double)w->points[point][2][i];
@@ -64,7 +64,10 @@ gait_start *start_layout(arena *a, const gait_model *m, const gait_start_config 
         s->cfg.stature = m->stature_mean;
     if (s->cfg.stature_sd == 0.0f)
         s->cfg.stature_sd = m->stature_sd;
-    s->layout = state_layout_init(m, &plain, run);
+    s->layout[s->classes++] = state_layout_init(m, &plain, run);
+    for (int32_t c = 1; c < m->classes; c++)
+        if (m->of_class[c]->direction != 0)
+            s->layout[s->classes++] = state_layout_of_class(&s->layout[0], c);
     s->crown = height_of(s, find_point(m, "head_top"));
     start_reset(s);
     return s;

@@ -7,12 +7,13 @@
 
 enum { N = START_UNKNOWNS, LD = START_LD };
 
-static const double RATE_SD_HZ = 0.15;  /* strides per second: people in films walk as slowly as they like */
-static const double SPEED_SD = 0.4;     /* metres per second, about the speed of the steps */
-static const double STILL_SD = 0.1;     /* metres per second, in place */
-static const double FLOOR_SD = 0.03;    /* metres: a camera's height is not exact */
-static const double PLACE_SD = 3.0;     /* metres, about where the length of the legs puts the person */
-static const double IN_PLACE = 8.0;     /* twice the log odds of walking along a path over walking in place */
+static const double RATE_SD_HZ = 0.15; /* strides per second: people in films walk as slowly as they like */
+static const double SPEED_SD = 0.4;    /* metres per second, about the speed of the steps */
+static const double STILL_SD = 0.1;    /* metres per second, in place */
+static const double FLOOR_SD = 0.03;   /* metres: a camera's height is not exact */
+static const double PLACE_SD = 3.0;    /* metres, about where the length of the legs puts the person */
+static const double UNUSUAL =
+    8.0; /* twice the log odds of the first class over another, of a path over in place */
 static const double DEGREES = 4.0;      /* of freedom of the keypoints' errors */
 static const double BEHIND_SDS = 1e3;   /* standard deviations for joints behind the camera */
 static const double LEAD = 0.1;         /* statures: the foot lower in the image is nearer than the body */
@@ -28,24 +29,25 @@ static const float LEAST_PLACE_SD = 0.05f; /* metres */
 /* Steps of the finite differences that replace derivatives. */
 static const double STEP[N] = {0.02, 0.02, 0.03, 0.03, 0.01, 0.01, 0.01, 0.01, 0.1, 0.1, 0.1};
 
-/* States of up to BLOCK candidates at a moment. */
-static void place_states(const gait_start *s, const double (*theta)[N], int32_t lanes, double at,
+/* States of up to BLOCK candidates of a class at a moment. */
+static void place_states(const state_layout *layout, const double (*theta)[N], int32_t lanes, double at,
                          particle_block *b)
 {
+    double const ahead = layout->model->direction * at;
     memset(b, 0, sizeof *b);
     for (int32_t i = 0; i < BLOCK; i++) {
         const double *const q = theta[i_min(i, lanes - 1)];
         float sn, cs;
-        float const heading = m_wrap_pi_one((float)q[START_HEADING]), way = (float)(q[START_SPEED] * at);
+        float const heading = m_wrap_pi_one((float)q[START_HEADING]), way = (float)(q[START_SPEED] * ahead);
         m_sincos_one(heading, &sn, &cs);
-        b->f[F_PHASE][i] = m_wrap1((float)(q[START_PHASE] + q[START_RATE] * at));
+        b->f[F_PHASE][i] = m_wrap1((float)(q[START_PHASE] + q[START_RATE] * ahead));
         b->f[F_RATE][i] = f_clamp((float)q[START_RATE], 0.1f, 4.0f);
         b->f[F_X][i] = (float)q[START_X] + way * cs;
         b->f[F_Y][i] = (float)q[START_Y] + way * sn;
         b->f[F_Z][i] = (float)q[START_FLOOR];
         b->f[F_HEADING][i] = heading;
         b->f[F_STATURE][i] = f_clamp((float)q[START_STATURE], LEAST_STATURE, 3.0f);
-        for (int32_t k = 0; k < s->layout.components; k++)
+        for (int32_t k = 0; k < layout->components; k++)
             b->f[F_COEF + k][i] = (float)q[START_SCORE + k];
     }
 }
@@ -76,14 +78,15 @@ static void point_residuals(const gait_start *s, const gait_camera *cam, const f
 }
 
 /* Residuals of a frame's box: rows x lanes. */
-static int32_t box_residuals(const gait_start *s, int32_t k, const double (*theta)[N], int32_t lanes)
+static int32_t box_residuals(const gait_start *s, const state_layout *layout, int32_t k,
+                             const double (*theta)[N], int32_t lanes)
 {
     start_scratch *const w = s->scratch;
     const start_problem *const p = &w->problem;
     const start_box *const b = &p->person->box[p->frame[k]];
     double const weight = w->inverse_sd[k][0];
     gait_camera const cam = start_camera(s, k);
-    place_states(s, theta, lanes, p->at[k], &w->states);
+    place_states(layout, theta, lanes, p->at[k], &w->states);
     for (int32_t i = 0; i < lanes; i++) {
         float X[3] = {w->states.f[F_X][i], w->states.f[F_Y][i], w->states.f[F_Z][i]}, from[3];
         float const tall = w->states.f[F_STATURE][i];
@@ -99,17 +102,18 @@ static int32_t box_residuals(const gait_start *s, int32_t k, const double (*thet
 }
 
 /* Residuals of a frame's keypoints: rows x lanes. */
-static int32_t frame_residuals(const gait_start *s, int32_t k, const double (*theta)[N], int32_t lanes)
+static int32_t frame_residuals(const gait_start *s, const state_layout *layout, int32_t k,
+                               const double (*theta)[N], int32_t lanes)
 {
     start_scratch *const w = s->scratch;
     const start_problem *const p = &w->problem;
     int32_t rows = 0;
     if (p->person)
-        return box_residuals(s, k, theta, lanes);
+        return box_residuals(s, layout, k, theta, lanes);
     gait_camera const cam = start_camera(s, k);
-    place_states(s, theta, lanes, p->at[k], &w->states);
-    particle_block_bodies(&s->layout, &w->states, &w->body);
-    kin_points(s->model, &w->body, w->points);
+    place_states(layout, theta, lanes, p->at[k], &w->states);
+    particle_block_bodies(layout, &w->states, &w->body);
+    kin_points(layout->model, &w->body, w->points);
     for (int32_t j = 0; j < s->model->points; j++) {
         const start_keypoint *const found = &s->keypoint[p->frame[k]][j];
         double const weight = w->inverse_sd[k][j];
@@ -125,10 +129,10 @@ static int32_t frame_residuals(const gait_start *s, int32_t k, const double (*th
 }
 
 /* The prior's residuals of one candidate. */
-static void prior_residuals(const gait_start *s, const double *q, bool in_place, double r[N])
+static void prior_residuals(const gait_start *s, const gait_model *m, const double *q, bool in_place,
+                            double r[N])
 {
     const start_problem *const p = &s->scratch->problem;
-    const gait_model *const m = s->model;
     double const usual = (double)m->stride_length * q[START_STATURE] * q[START_RATE];
     r[START_X] = (q[START_X] - p->place[0]) / PLACE_SD;
     r[START_Y] = (q[START_Y] - p->place[1]) / PLACE_SD;
@@ -141,22 +145,24 @@ static void prior_residuals(const gait_start *s, const double *q, bool in_place,
         r[START_SCORE + k] = q[START_SCORE + k];
 }
 
-/* Costs of up to BLOCK candidates of one mode. */
-static void costs(const gait_start *s, const double (*theta)[N], int32_t lanes, bool in_place, double *cost,
-                  double *chi2)
+/* Costs of up to BLOCK candidates of one mode and class. */
+static void costs(const gait_start *s, const state_layout *layout, const double (*theta)[N], int32_t lanes,
+                  bool in_place, double *cost, double *chi2)
 {
     start_scratch *const w = s->scratch;
+    double const odds =
+        (in_place && !w->problem.person ? UNUSUAL : 0.0) + (layout == s->layout ? 0.0 : UNUSUAL);
     memset(chi2, 0, (size_t)lanes * sizeof *chi2);
     for (int32_t k = 0; k < w->problem.frames; k++) {
-        int32_t const rows = frame_residuals(s, k, theta, lanes);
+        int32_t const rows = frame_residuals(s, layout, k, theta, lanes);
         for (int32_t row = 0; row < rows; row++)
             for (int32_t i = 0; i < lanes; i++)
                 chi2[i] += w->residual[row][i] * w->residual[row][i];
     }
     for (int32_t i = 0; i < lanes; i++) {
         double r[N];
-        prior_residuals(s, theta[i], in_place, r);
-        cost[i] = chi2[i] * w->problem.share + (in_place && !w->problem.person ? IN_PLACE : 0.0);
+        prior_residuals(s, layout->model, theta[i], in_place, r);
+        cost[i] = chi2[i] * w->problem.share + odds;
         for (int32_t k = 0; k < N; k++)
             cost[i] += r[k] * r[k];
     }
@@ -171,12 +177,12 @@ static void linearise(const gait_start *s, const start_candidate *c)
         memcpy(theta[i], c->theta, sizeof theta[i]);
         if (i > 0)
             theta[i][i - 1] += STEP[i - 1];
-        prior_residuals(s, theta[i], c->in_place, r[i]);
+        prior_residuals(s, c->layout->model, theta[i], c->in_place, r[i]);
     }
     memset(w->A, 0, sizeof w->A);
     for (int32_t k = 0; k <= w->problem.frames; k++) {
         bool const prior = k == w->problem.frames;
-        int32_t const rows = prior ? N : frame_residuals(s, k, (const double (*)[N])theta, N + 1);
+        int32_t const rows = prior ? N : frame_residuals(s, c->layout, k, (const double (*)[N])theta, N + 1);
         memset(w->W, 0, (size_t)rows * LD * sizeof *w->W);
         for (int32_t row = 0; row < rows; row++) {
             double *const out = w->W + row * LD;
@@ -225,7 +231,7 @@ static void refine(const gait_start *s, start_candidate *c, int32_t iterations)
                 return;
             for (int32_t i = 0; i < N; i++)
                 next[0][i] = c->theta[i] + step[i];
-            costs(s, (const double (*)[N])next, 1, c->in_place, &cost, &chi2);
+            costs(s, c->layout, (const double (*)[N])next, 1, c->in_place, &cost, &chi2);
             better = cost < c->cost;
             damping *= better ? 0.25 : 4.0;
             if (better) {
@@ -252,35 +258,49 @@ static void best_first(start_candidate *c, int32_t count, int32_t n)
     }
 }
 
-/* Every heading, phase and mode, walking with the model's usual rate and speed; returns how many. */
-static int32_t propose(const gait_start *s)
+/* Every heading and phase of a mode and class, with its usual rate and speed, from candidate n on; returns how many there
+ * are then. */
+static int32_t propose_mode(const gait_start *s, const state_layout *layout, bool in_place, int32_t n)
 {
     start_scratch *const w = s->scratch;
-    int32_t n = 0;
+    const gait_model *const m = layout->model;
     int32_t const phases = w->problem.person ? 1 : START_PHASES;
-    for (int32_t mode = 0; mode < 2; mode++) {
-        int32_t const headings = mode && w->problem.person ? 1 : START_HEADINGS;
-        for (int32_t first = 0; first < headings * phases; first += BLOCK) {
-            int32_t const lanes = i_min(BLOCK, headings * phases - first);
-            double theta[BLOCK][N] = {{0.0}}, cost[BLOCK], chi2[BLOCK];
-            for (int32_t i = 0; i < lanes; i++) {
-                double *const q = theta[i];
-                q[START_X] = w->problem.place[0];
-                q[START_Y] = w->problem.place[1];
-                q[START_HEADING] = (double)((first + i) / phases) * 2.0 * (double)PI_F / START_HEADINGS;
-                q[START_PHASE] = (double)((first + i) % phases) / phases;
-                q[START_RATE] = (double)s->model->stride_hz;
-                q[START_STATURE] = (double)s->cfg.stature;
-                q[START_SPEED] =
-                    mode ? 0.0 : (double)s->model->stride_length * q[START_STATURE] * q[START_RATE];
-            }
-            costs(s, (const double (*)[N])theta, lanes, mode == 1, cost, chi2);
-            for (int32_t i = 0; i < lanes; i++, n++) {
-                w->candidate[n] = (start_candidate){.cost = cost[i], .chi2 = chi2[i], .in_place = mode == 1};
-                memcpy(w->candidate[n].theta, theta[i], sizeof theta[i]);
-            }
+    int32_t const headings = in_place && w->problem.person ? 1 : START_HEADINGS;
+    for (int32_t first = 0; first < headings * phases; first += BLOCK) {
+        int32_t const lanes = i_min(BLOCK, headings * phases - first);
+        double theta[BLOCK][N] = {{0.0}}, cost[BLOCK], chi2[BLOCK];
+        for (int32_t i = 0; i < lanes; i++) {
+            double *const q = theta[i];
+            q[START_X] = w->problem.place[0];
+            q[START_Y] = w->problem.place[1];
+            q[START_HEADING] = (double)((first + i) / phases) * 2.0 * (double)PI_F / START_HEADINGS;
+            q[START_PHASE] = (double)((first + i) % phases) / phases;
+            q[START_RATE] = (double)m->stride_hz;
+            q[START_STATURE] = (double)s->cfg.stature;
+            q[START_SPEED] = in_place ? 0.0 : (double)m->stride_length * q[START_STATURE] * q[START_RATE];
+        }
+        costs(s, layout, (const double (*)[N])theta, lanes, in_place, cost, chi2);
+        for (int32_t i = 0; i < lanes; i++, n++) {
+            w->candidate[n] =
+                (start_candidate){.cost = cost[i], .chi2 = chi2[i], .layout = layout, .in_place = in_place};
+            memcpy(w->candidate[n].theta, theta[i], sizeof theta[i]);
         }
     }
+    return n;
+}
+
+/* The best candidates of all modes and classes; returns how many. */
+static int32_t propose(const gait_start *s)
+{
+    start_candidate *const c = s->scratch->candidate;
+    int32_t const classes = s->scratch->problem.person ? 1 : s->classes;
+    int32_t n = 0;
+    for (int32_t k = 0; k < classes; k++)
+        for (int32_t in_place = 0; in_place < 2; in_place++) {
+            int32_t const proposed = propose_mode(s, &s->layout[k], in_place, n);
+            n = i_min(proposed, START_REFINED);
+            best_first(c, proposed, n);
+        }
     return n;
 }
 
@@ -291,7 +311,7 @@ static bool same(const start_candidate *a, const start_candidate *b, bool boxes)
         return true;
     float const turn = m_wrap_pi_one((float)(a->theta[START_HEADING] - b->theta[START_HEADING]));
     float const phase = m_wrap_pi_one(TWO_PI_F * (float)(a->theta[START_PHASE] - b->theta[START_PHASE]));
-    return a->in_place == b->in_place && fabsf(turn) < 0.3f && fabsf(phase) < 0.6f;
+    return a->in_place == b->in_place && a->layout == b->layout && fabsf(turn) < 0.3f && fabsf(phase) < 0.6f;
 }
 
 /* Leave out candidates that repeat an earlier one; returns how many are left. */
@@ -312,8 +332,7 @@ int32_t start_fit(const gait_start *s, int32_t capacity)
 {
     start_candidate *const c = s->scratch->candidate;
     bool const boxes = s->scratch->problem.person != NULL;
-    int32_t const proposed = propose(s), refined = i_min(proposed, START_REFINED);
-    best_first(c, proposed, refined);
+    int32_t const refined = propose(s);
     for (int32_t i = 0; i < refined; i++)
         refine(s, &c[i], boxes ? 8 : 3);
     best_first(c, refined, refined);
@@ -331,13 +350,12 @@ static float root(double variance)
 
 /* Widen standard deviations.  Keypoints are less exact than their scatter suggests, because a detector's errors last, and
  * a person who has just begun to walk will soon be faster. */
-static void widen(const gait_start *s, gait_hypothesis *h)
+static void widen(const gait_model *m, gait_hypothesis *h)
 {
     h->sd.phase = f_clamp(h->sd.phase, 0.03f, 0.5f);
     h->sd.heading = f_clamp(h->sd.heading, 0.08f, PI_F);
     h->sd.stature = f_max(h->sd.stature, 0.03f);
-    h->sd.stride_hz =
-        f_max(h->sd.stride_hz, f_max(0.03f, SPEEDS_UP * (s->model->stride_hz - h->mean.stride_hz)));
+    h->sd.stride_hz = f_max(h->sd.stride_hz, f_max(0.03f, SPEEDS_UP * (m->stride_hz - h->mean.stride_hz)));
     for (int32_t k = 0; k < 3; k++)
         h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], LEAST_PLACE_SD, MOST_SD);
 }
@@ -378,13 +396,13 @@ static double leave_open(const gait_start *s, const start_candidate *c, gait_hyp
 static void describe_errors(const start_scratch *w, const start_candidate *c, double at, double row[N][LD])
 {
     float sn, cs;
-    double const way = at * c->theta[START_SPEED];
+    double const ahead = c->layout->model->direction * at, way = ahead * c->theta[START_SPEED];
     m_sincos_one((float)c->theta[START_HEADING], &sn, &cs);
     memset(row, 0, N * sizeof *row);
-    row[START_PHASE][START_RATE] = at;
-    row[START_X][START_SPEED] = at * (double)cs;
+    row[START_PHASE][START_RATE] = ahead;
+    row[START_X][START_SPEED] = ahead * (double)cs;
     row[START_X][START_HEADING] = -way * (double)sn;
-    row[START_Y][START_SPEED] = at * (double)sn;
+    row[START_Y][START_SPEED] = ahead * (double)sn;
     row[START_Y][START_HEADING] = way * (double)cs;
     for (int32_t i = 0; i < N; i++) {
         row[i][i] = 1.0;
@@ -435,11 +453,11 @@ double start_describe(const gait_start *s, const start_candidate *c, double at, 
         memset(w->U, 0, sizeof w->U);
     describe_errors(w, c, at, row);
     memcpy(theta[0], c->theta, sizeof theta[0]);
-    place_states(s, (const double (*)[N])theta, 1, at, &w->states);
+    place_states(c->layout, (const double (*)[N])theta, 1, at, &w->states);
     particle_state now = {{0}};
     for (int32_t f = 0; f < F_MAX; f++)
         now.f[f] = w->states.f[f][0];
-    h->mean = particle_to_state(&s->layout, &now);
+    h->mean = particle_to_state(c->layout, &now);
     h->sd = s->prior_sd;
     h->sd.phase = sd_of(row[START_PHASE]);
     h->sd.stride_hz = sd_of(row[START_RATE]);
@@ -448,13 +466,13 @@ double start_describe(const gait_start *s, const start_candidate *c, double at, 
     h->sd.pelvis[0] = sd_of(row[START_X]);
     h->sd.pelvis[1] = sd_of(row[START_Y]);
     h->sd.pelvis[2] = sd_of(row[START_FLOOR]);
-    for (int32_t k = 0; k < s->layout.components; k++)
+    for (int32_t k = 0; k < c->layout->components; k++)
         h->sd.coef[k] = sd_of(row[START_SCORE + k]);
     double added = 0.0;
     if (w->problem.person)
         added = leave_open(s, c, h);
     else
-        widen(s, h);
+        widen(c->layout->model, h);
     correlate((const double (*)[LD])row, added, h);
     h->speed = (float)c->theta[START_SPEED];
     h->speed_sd = sd_of(row[START_SPEED]);

@@ -1,9 +1,10 @@
 /* start_fit.h - fit of a walk to the observations of a second: straight and even, or in place.
  *
  * Unknowns: place, heading, speed, phase and rate at the middle of the frames, stature, height of the floor, and the
- * first three scores.  Every heading, phase and mode is scored by its squared error; the best are refined by
- * Levenberg-Marquardt on robust residuals (Student's t), all derivatives from one block of bodies per frame.
- * Boxes do not show the phase: their candidates differ in heading alone. */
+ * first three scores.  Every heading, phase and mode is scored by its squared error, in every class of the model that
+ * takes strides; the best are refined by Levenberg-Marquardt on robust residuals (Student's t), all derivatives from one
+ * block of bodies per frame.  Boxes do not show the phase: their candidates differ in heading alone, and are of the first
+ * class. */
 #ifndef GAIT_START_START_FIT_H
 #define GAIT_START_START_FIT_H
 #include "base/arena.h"
@@ -28,17 +29,19 @@ enum {
     START_REFINED = 32, /* candidates that are refined */
     START_HEADINGS = 12,
     START_PHASES = 6,
-    START_PROPOSED = 2 * START_HEADINGS * START_PHASES,
-    START_LD = 16,                    /* cholesky_padded(START_UNKNOWNS + 1) */
-    START_ROWS = 2 * GAIT_MAX_JOINTS, /* of a frame */
-    START_BOX_ROWS = 4                /* foot and crown */
+    START_CANDIDATES =
+        START_REFINED + START_HEADINGS * START_PHASES, /* the best so far, and those of a mode */
+    START_LD = 16,                                     /* cholesky_padded(START_UNKNOWNS + 1) */
+    START_ROWS = 2 * GAIT_MAX_JOINTS,                  /* of a frame */
+    START_BOX_ROWS = 4                                 /* foot and crown */
 };
 _Static_assert((int)START_UNKNOWNS < (int)BLOCK, "a block of bodies holds a candidate and its derivatives");
 
 typedef struct start_candidate {
     double theta[START_UNKNOWNS];
-    double cost; /* squared residuals with the prior's, and twice the prior's odds of the mode */
+    double cost; /* squared residuals with the prior's, and twice the prior's odds of the mode and class */
     double chi2; /* squared residuals of the keypoints, without the factor for errors that last */
+    const state_layout *layout; /* of its class */
     bool in_place;
 } start_candidate;
 
@@ -54,7 +57,7 @@ typedef struct start_problem {           /* the observations that all candidates
 
 typedef struct start_scratch { /* of one fit */
     start_problem problem;
-    start_candidate candidate[START_PROPOSED];
+    start_candidate candidate[START_CANDIDATES];
     particle_block states;
     kin_body body;
     float points[GAIT_MAX_JOINTS][3][BLOCK];
@@ -71,10 +74,11 @@ struct gait_start { /* observations, and what is known about the person */
     const gait_model *model;
     const kernels *run;
     gait_start_config cfg; /* camera: as it is now */
-    state_layout layout;
-    gait_state prior_sd;      /* of what is not known about the person */
-    int32_t hip[2], ankle[2]; /* points of the model */
-    double crown;             /* height of head_top over the floor while walking, statures */
+    int32_t classes;
+    state_layout layout[GAIT_MAX_CLASSES]; /* of the classes that take strides, the model's first one first */
+    gait_state prior_sd;                   /* of what is not known about the person */
+    int32_t hip[2], ankle[2];              /* points of the model */
+    double crown;                          /* height of head_top over the floor while walking, statures */
     int32_t count; /* frames of keypoints added, of which the last GAIT_START_MAX_FRAMES are kept */
     int64_t utime[GAIT_START_MAX_FRAMES];
     start_view view[GAIT_START_MAX_FRAMES];

@@ -126,6 +126,8 @@ class Model:
     joint_names, angle_names, limb_names : tuple of str
     classes : tuple of str
         Names of the classes of motion; "walk" alone if the blob names none.
+    directions : dict of str to int
+        Direction in which the phase of each class runs: 1, -1 (backwards) or 0 (a class that stands).
 
     Raises
     ------
@@ -148,6 +150,7 @@ class Model:
         self.angle_names = self._names("angle", info.angles)
         self.limb_names = self._names("limb", info.limbs)
         self.classes = self._names("class", info.classes)
+        self.directions = {name: self.class_info(k).direction for k, name in enumerate(self.classes)}
 
     def _names(self, kind: str, count: int) -> tuple[str, ...]:
         """List names of joints, angles or limbs; bytes that are not UTF-8 are escaped."""

@@ -109,8 +109,7 @@ def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | N
         further = [PersonKeypoints(one.camera, one.keypoints, one.person) for one in scene.further]
         keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person, scene.apart, further)
     model = scene.model
-    directions = {name: model.class_info(k).direction for k, name in enumerate(model.classes)}
-    plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt, directions)
+    plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt, model.directions)
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
     joints_found = keypoints if isinstance(keypoints, PersonKeypoints) else None

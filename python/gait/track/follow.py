@@ -196,8 +196,7 @@ class Follower:
                 self._start(tracker, start, utime)
                 since = begun = before = frame.time
             now = self._step(tracker, frame, utime, now)
-            if now.takes_strides:
-                strides += now.mean.stride_hz * (frame.time - before)
+            strides += tracker.model.directions[now.motion_class] * now.mean.stride_hz * (frame.time - before)
             before = frame.time
             if now.status != TrackStatus.TRACKING or not now.takes_strides:
                 since = frame.time

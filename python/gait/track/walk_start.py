@@ -149,8 +149,11 @@ def find_starts(
             for frame, time in zip(keypoints.frame[near], keypoints.time[near], strict=True):
                 fit.add(round(1e6 * time), noise[int(frame)])
             try:
-                walk = fit.solve(round(1e6 * middle))[0]
+                walks = fit.solve(round(1e6 * middle))
             except GaitError:
+                continue
+            walk = next((one for one in walks if one.mean.motion_class == 0), None)  # all else has that class
+            if walk is None:
                 continue
             if best is None or walk.chi2_per_observation < best.walk.chi2_per_observation:
                 best = WalkStart(q, walk, middle)
