@@ -23,13 +23,16 @@ def camera():
     return Camera(1280, 720, 1000, 1000, 639.5, 359.5, R=np.array(rotation, float), t=np.array([0, 1.5, 0]))
 
 
-def walk(model, camera, frames, *, heading=0.3, speed=1.3, stands=0, noise=2.0):
-    """Keypoints of a person who stands for some frames and then walks."""
+def walk(model, camera, frames, *, heading=0.3, speed=1.3, stands=0, noise=2.0, motion="walk"):
+    """Keypoints of a person who stands for some frames and then walks, in a class of motion."""
+    motion_class, direction = model.classes.index(motion), model.directions[motion]
+    rate = model.class_info(motion_class).stride_hz
     rng, uv = np.random.default_rng(3), []
     for n in range(frames):
         t = max(n - stands, 0) / FPS
-        state = State(phase=(0.1 + 0.9 * t) % 1, stride_hz=0.9, heading=heading)
-        way = speed * t * np.array([np.cos(heading), np.sin(heading)])
+        phase = (0.1 + direction * rate * t) % 1
+        state = State(phase=phase, stride_hz=rate, heading=heading, motion_class=motion_class)
+        way = direction * speed * t * np.array([np.cos(heading), np.sin(heading)])
         state.pelvis[:] = *(np.array([-1.0, 5.0]) + way), model.pelvis_height(state)
         joints = dict(zip(model.joint_names, model.pose(state)[0], strict=True))
         uv.append(camera.project(np.array([joints[name] for name in LANDMARK_JOINTS])))
@@ -46,6 +49,18 @@ def test_a_walk_is_found_at_its_first_frame(model, camera):
     assert start.mean.heading == pytest.approx(0.3, abs=0.1)
     assert start.mean.phase == pytest.approx(0.1, abs=0.04)
     assert np.allclose(start.mean.pelvis[:2], [-1, 5], atol=0.4)
+
+
+@pytest.mark.parametrize(("motion", "speed"), [("walk", 1.3), ("backwards", 1.1), ("run", 3.0)])
+@pytest.mark.parametrize("heading", [0.3, 1.6, 4.0])
+def test_a_start_is_in_the_class_of_the_motion(camera, motion, speed, heading):
+    model = Model("classes")
+    keypoints = walk(model, camera, 26, heading=heading, speed=speed, motion=motion)
+    start = find_keypoint_start(keypoints, camera, model, height=1.75)
+    assert model.classes[start.mean.motion_class] == motion
+    assert np.cos(start.mean.heading - heading) > 0.98
+    assert abs((start.mean.phase - 0.1 + 0.5) % 1 - 0.5) < 0.06
+    assert start.hypotheses[0].speed == pytest.approx(speed, rel=0.2)
 
 
 def test_a_person_who_stands_first_is_found_walking(model, camera):

@@ -442,6 +442,28 @@ class Pauses(Walks):
         return replace(now, speed=0.0 if 4 < number <= 4 + pause else 1.2)
 
 
+class Returns(Walks):
+    """Walks backwards: the phase falls."""
+
+    def like(self, config):
+        return Returns(self.estimate, self.leaves, self.starts)
+
+    def step(self, image, utime, keypoints, poses, backgrounds, people):
+        now = super().step(image, -utime, keypoints, poses, backgrounds, people)
+        return replace(now, motion_class="back")
+
+
+def test_the_side_of_a_walk_backwards_is_that_of_the_start(estimate):
+    mean = replace(estimate.mean, phase=0.62)
+    one = Hypothesis(mean, estimate.sd, 1.2, 0.1, 1.0, 1.0, False, True, np.eye(6))
+    people = PersonKeypoints(camera(), {1: {n: found() for n in range(20)}}, 1)
+    starts = []
+    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS | {"back": -1})
+    follower = Follower(Returns(estimate, -1, starts), Film(), people, plausible, lambda *_: None)
+    list(follower.follow(Start(0, mean, estimate.sd, hypotheses=(one,)), range(20)))
+    assert starts == [None, pytest.approx(0.12)]
+
+
 def test_a_side_decided_after_a_stand_is_that_of_the_start(estimate):
     mean = replace(estimate.mean, phase=0.12)
     one = Hypothesis(mean, estimate.sd, 1.2, 0.1, 1.0, 1.0, False, True, np.eye(6))

@@ -3,6 +3,7 @@
 #include "base/rng.h"
 #include "filter/particles.h"
 #include "image/camera.h"
+#include "toy_classes.h"
 #include "toy_start.h"
 
 #include <string.h>
@@ -15,6 +16,7 @@ typedef struct walk { /* from which keypoints are generated */
     float wrong;      /* share of keypoints that are somewhere else */
     bool legs_cut;    /* hips and ankles are not in view */
     float drive, pan; /* of the camera, to the right and to the left: metres and radians per second */
+    bool back;        /* they walk backwards */
 } walk;
 
 static walk usual(void)
@@ -40,15 +42,16 @@ static gait_camera camera_at(const walk *w, float t)
 
 static gait_state state_at(const walk *w, float t)
 {
-    gait_state s = toy_state(m_wrap1(w->phase + w->rate * t));
+    float const ahead = w->back ? -t : t;
+    gait_state s = toy_state(m_wrap1(w->phase + w->rate * ahead));
     s.heading = w->heading;
     s.stature = w->stature;
     s.stride_hz = w->rate;
     float height, sn, cs;
     m_sincos_one(w->heading, &sn, &cs);
     CHECK(gait_model_pelvis_height(toy_model(), &s, &height, NULL) == GAIT_OK);
-    s.pelvis[0] = w->x + w->speed * t * cs;
-    s.pelvis[1] = w->y + w->speed * t * sn;
+    s.pelvis[0] = w->x + w->speed * ahead * cs;
+    s.pelvis[1] = w->y + w->speed * ahead * sn;
     s.pelvis[2] = height;
     return s;
 }
@@ -89,9 +92,9 @@ static void show(gait_start *s, const walk *w, int frames)
     }
 }
 
-static gait_hypothesis find(const walk *w)
+static gait_hypothesis find_with(const gait_model *model, const walk *w)
 {
-    gait_start *const s = toy_start_new(camera(), ~0u);
+    gait_start *const s = toy_start_of(model, camera(), ~0u);
     gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
     int32_t count = 0;
     show(s, w, FRAMES);
@@ -99,6 +102,11 @@ static gait_hypothesis find(const walk *w)
     CHECK(count >= 1);
     free(s);
     return h[0];
+}
+
+static gait_hypothesis find(const walk *w)
+{
+    return find_with(toy_model(), w);
 }
 
 static float turned(float a, float b)
@@ -160,6 +168,21 @@ static void test_slow_and_fast(void)
     check_found(&slow, &h);
     h = find(&fast);
     check_found(&fast, &h);
+}
+
+/* A model with a class that walks backwards finds either, at the right moment of the stride. */
+static void test_backwards(void)
+{
+    for (int k = 0; k < 8; k++) {
+        walk w = usual();
+        w.heading = (float)k * 0.785f + 0.1f;
+        w.phase = (float)k / 8.0f;
+        w.noise = 2.0f;
+        w.back = k % 2 == 0;
+        gait_hypothesis const h = find_with(toy_classes_model(), &w);
+        check_found(&w, &h);
+        CHECK(h.mean.motion_class == (w.back ? TOY_BACK : TOY_WALK) && gait_hypothesis_walks(&h));
+    }
 }
 
 static void test_treadmill(void)
@@ -405,6 +428,7 @@ static void tests(void)
     test_headings();
     test_moving_camera();
     test_slow_and_fast();
+    test_backwards();
     test_treadmill();
     test_outliers();
     test_no_walk();

@@ -23,7 +23,7 @@ static gait_camera level_camera(int32_t width, int32_t height, float f)
                          .t = {0.0f, 1.5f, 0.0f}};
 }
 
-static gait_start *toy_start_new(gait_camera camera, uint32_t cpu_mask)
+static gait_start *toy_start_of(const gait_model *model, gait_camera camera, uint32_t cpu_mask)
 {
     gait_start_config cfg;
     gait_start *s = NULL;
@@ -31,10 +31,15 @@ static gait_start *toy_start_new(gait_camera camera, uint32_t cpu_mask)
     gait_start_default(&cfg);
     cfg.camera = camera;
     cfg.cpu_mask = cpu_mask;
-    CHECK(gait_start_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
+    CHECK(gait_start_bytes(model, &cfg, &bytes, NULL) == GAIT_OK);
     void *const mem = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
-    CHECK(gait_start_init(mem, bytes, toy_model(), &cfg, &s, NULL) == GAIT_OK);
+    CHECK(gait_start_init(mem, bytes, model, &cfg, &s, NULL) == GAIT_OK);
     return s; /* at the beginning of mem */
+}
+
+static inline gait_start *toy_start_new(gait_camera camera, uint32_t cpu_mask)
+{
+    return toy_start_of(toy_model(), camera, cpu_mask);
 }
 
 /* Hash of all hypotheses without their classes of motion, which are 0. */

@@ -196,7 +196,9 @@ class Follower:
                 self._start(tracker, start, utime)
                 since = begun = before = frame.time
             now = self._step(tracker, frame, utime, now)
-            strides += tracker.model.directions[now.motion_class] * now.mean.stride_hz * (frame.time - before)
+            if now.takes_strides:
+                direction = self._plausibility.directions[now.motion_class]
+                strides += direction * now.mean.stride_hz * (frame.time - before)
             before = frame.time
             if now.status != TrackStatus.TRACKING or not now.takes_strides:
                 since = frame.time

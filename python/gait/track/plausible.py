@@ -34,7 +34,11 @@ class Plausibility:
     belt : float
         Share of each stride that a treadmill's belt moves the person back.
     directions : mapping of str to int
-        For each class of motion: 1 forwards, -1 backwards, 0 standing.
+        `Model.directions`.
+
+    Attributes
+    ----------
+    directions : mapping of str to int
     """
 
     def __init__(
@@ -47,7 +51,7 @@ class Plausibility:
     ) -> None:
         self._keypoints = keypoints
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
-        self._travel, self._directions = 1.0 - belt, directions
+        self.directions, self._travel = directions, 1.0 - belt
         self._path: deque[tuple[float, ...]] = deque()  # times, places, velocities
 
     def restart(self) -> None:
@@ -76,7 +80,7 @@ class Plausibility:
         `time`: seconds; it may decrease.
         """
         heading = estimate.mean.heading
-        speed = self._directions[estimate.motion_class] * estimate.speed * self._travel
+        speed = self.directions[estimate.motion_class] * estimate.speed * self._travel
         self._path.append((time, *estimate.mean.pelvis[:2], speed * np.cos(heading), speed * np.sin(heading)))
         while abs(time - self._path[0][0]) > 1.0:
             self._path.popleft()
