@@ -236,6 +236,11 @@ def test_the_command_shares_lengths_and_names_the_stranger(laboratory, tmp_path,
     assert again[0] == model and "limb" not in again[2]
 
 
+def alike(one, other):
+    """Whether two sequences have the same angles, but for last bits: kernels differ by memory alignment."""
+    return np.allclose(one.channels, other.channels, rtol=0, atol=1e-9, equal_nan=True)
+
+
 def test_recordings_of_one_person_have_one_body(laboratory):
     files, _ = sources.find([str(laboratory)])
     options = LearnOptions(activity="any")
@@ -246,7 +251,7 @@ def test_recordings_of_one_person_have_one_body(laboratory):
     assert thigh["anna_1"] == pytest.approx(thigh["anna_2"], rel=1e-9)
     assert own["anna_1"] != pytest.approx(own["anna_2"], rel=1e-3)
     for one, other in zip(read, alone, strict=True):
-        same = one.channels.tobytes() == other.channels.tobytes()
+        same = alike(one, other)
         assert same == (one.source.stem in ("ben_1", "cleo_0"))
 
 
@@ -282,7 +287,7 @@ def test_a_file_refused_with_the_lengths_of_the_others_has_its_own(tmp_path):
     options = LearnOptions(activity="any")
     together, alone = Task(path, options, wrong).run(), Task(path, options).run()
     assert together.alone and together.refused is None and not alone.alone
-    assert np.array_equal(together.sequence.channels, alone.sequence.channels, equal_nan=True)
+    assert alike(together.sequence, alone.sequence)
     shared = [load.SharedLengths(wrong, 3)]
     assert load.load_all([(path, True)], options, shared=shared).sequences[0].recordings == 1
 
