@@ -102,7 +102,7 @@ Clips of `gait simulate`, and the development clips (names with a number), whose
 all models were learnt from.  The start is the truth with noise and does not state the class, so people who
 stand or walk backwards are tracked as walking for the first frames.  {ALONE}: the same model without its
 other classes.  {" and ".join(USERS)}: as users track, with `gait track -m classes`, the camera, the
-detector and an automatic start, without and with --smooth; errors are those of the frames in the track.
+detector and an automatic start, without and with --smooth, one seed; errors are those of frames in the track.
 
 - root: error with the hips aligned, median over frames, then over seeds; abs: error without alignment
 - verdict, of the clips of `gait simulate`: reached, or what misses its target
@@ -155,7 +155,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seeds", type=int, default=3, help="runs of a clip (3)")
+    parser.add_argument("--seeds", type=int, default=3, help="runs of a clip from the truth (3)")
     parser.add_argument(
         "--jobs", type=int, default=2, help="runs side by side; results do not depend on it (2)"
     )
@@ -164,7 +164,7 @@ def main() -> None:
     args = parser.parse_args()
     clips = _clips(args.only)
     runs: list[Run] = []
-    with progress("tracking", args.seeds * sum(len(_sources(clip)) for clip in clips)) as update:
+    with progress("tracking", len(_each(clips, args.seeds))) as update:
         for run in _runs(clips, args.seeds, args.jobs):
             runs.append(run)
             update(len(runs))
@@ -197,11 +197,19 @@ def _runs(clips: list[Clip], seeds: int, jobs: int) -> Iterator[Run]:
     """Track every clip with every model, side by side."""
     alone = OUT / f"{ALONE}.gait"
     blob.write(alone, {tag: of for tag, of in read_cyclic("classes").items() if not of_class(tag)})
-    each = [
-        (clip, source, seed) for clip in clips for source in _sources(clip) for seed in range(1, seeds + 1)
-    ]
+    each = _each(clips, seeds)
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         yield from pool.map(_run, *zip(*each, strict=True))
+
+
+def _each(clips: list[Clip], seeds: int) -> list[tuple[Clip, str, int]]:
+    """Clip, source and seed of every run; as users with one seed, since a detector's start has none."""
+    return [
+        (clip, source, seed)
+        for clip in clips
+        for source in _sources(clip)
+        for seed in range(1, 2 if source in USERS else seeds + 1)
+    ]
 
 
 def _sources(clip: Clip) -> list[str]:
