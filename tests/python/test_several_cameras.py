@@ -255,7 +255,7 @@ def test_most_cameras_decide_whether_keypoints_are_near():
         def _near(self, frame, estimate):
             return self.answer
 
-        _agree = _near
+        _agree = _faces = _near
 
     for answers, wanted in (
         ((None, None, None), None),
@@ -268,7 +268,7 @@ def test_most_cameras_decide_whether_keypoints_are_near():
         one = Answers(
             first, [Answers(second), Answers(True), Answers(third)]
         )  # the third camera has no frame
-        assert one.near(frame, None) is one.agree(frame, None) is wanted
+        assert one.near(frame, None) is one.agree(frame, None) is one.faces(frame, None) is wanted
 
 
 @pytest.mark.long

@@ -381,6 +381,63 @@ def test_swapped_legs_agree(estimate):
     assert people.agree(Frame(0, 0.0, FRAMES[-1]), estimate) is True
 
 
+def swapped(*parts):
+    """Order of the joints with left and right of some parts swapped; of all without any."""
+    other = other_sides(MODEL.joint_names)
+    names = enumerate(MODEL.joint_names)
+    return [other[i] if not parts or name[2:] in parts else i for i, name in names]
+
+
+@pytest.fixture(scope="module")
+def of_sides(estimate):
+    """Judge 40 frames of an estimate turned by an angle, some of whose keypoints have other sides."""
+
+    def run(turn, order, when):
+        c, s, middle = np.cos(turn), np.sin(turn), JOINTS[-1][0]
+        joints = (JOINTS[-1] - middle) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + middle
+        keypoints = {n: found(joints=joints[order] if n in when else joints) for n in range(40)}
+        people = PersonKeypoints(camera(), {1: keypoints}, 1)
+        plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS)
+        rows = [(Frame(n, n / 30, FRAMES[0]), replace(estimate, joints=joints, frame=n)) for n in range(40)]
+        return plausible, rows
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("turn", "parts", "when", "ambiguous"),
+    [
+        (np.pi / 2, (), range(0), range(0)),
+        (np.pi / 2, (), range(4, 11), range(0)),
+        (np.pi / 2, (), range(4, 12), range(11, 35)),
+        (np.pi / 2, (), range(2, 18, 2), range(16, 33)),
+        (-np.pi / 2, (), range(4, 12), range(11, 35)),
+        (np.pi / 2, ("shoulder",), range(40), range(0)),
+        (np.pi / 2, ("hip", "knee", "ankle"), range(40), range(0)),
+        (0.0, (), range(40), range(0)),
+    ],
+)
+def test_trunks_that_face_the_other_way_for_a_quarter_of_a_second_are_ambiguous(
+    of_sides, turn, parts, when, ambiguous
+):
+    """Shoulders and hips together, in views from the front or behind; the walk is seen from the side."""
+    plausible, rows = of_sides(turn, swapped(*parts), when)
+    judged = [plausible.judged(*row) for row in rows]
+    found = [n for n, now in enumerate(judged) if now.status != TrackStatus.TRACKING]
+    assert found == list(ambiguous)
+    assert {judged[n].reason for n in found} <= {"the detected joints show the person facing the other way"}
+
+
+def test_a_smoothed_track_is_ambiguous_for_the_second_before_too(of_sides):
+    """But not across a start."""
+    plausible, rows = of_sides(np.pi / 2, swapped(), range(32, 40))
+    for start, first in ((0, 9), (20, 20)):
+        found = [(frame, replace(now, frame=frame.number - start)) for frame, now in rows]
+        ambiguous = [now.status == TrackStatus.AMBIGUOUS for now in plausible.judged_later(found)]
+        assert ambiguous == [n >= first for n in range(40)]
+    assert [now.status for now in plausible.judged_later(rows[:39])] == [TrackStatus.TRACKING] * 39
+
+
 class Walks(Script):
     """A tracker of a steady walk, which records the phases of its starts; those of hypotheses are open."""
 

@@ -265,8 +265,6 @@ def _smoothed(
     frames: Iterable[Frame] = (frame for frame, _ in rows)
     if options.overlay or options.report:  # decode the pictures again
         frames = scene.video.frames(rows[0][0].number, rows[-1][0].number + 1)
-    plausibility.restart()
-    for frame, (_, estimate) in zip(frames, rows, strict=True):
-        yield frame, plausibility.judged(frame, estimate)
+    yield from zip(frames, plausibility.judged_later(rows), strict=True)
     if options.draws:  # last, so that they are never left beside an unfinished track
         draws.write(options.draws)

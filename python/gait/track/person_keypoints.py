@@ -24,6 +24,8 @@ _GATE = 0.25  # person's heights; keypoints with a larger median distance are no
 _SUPPORTING_DISTANCE = 0.15  # person's heights; up to this distance they support the estimate
 _AGREE = 0.08  # person's heights; mean distance up to which knees and ankles agree with the estimate
 _LEG_JOINTS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
+_TRUNK_PAIRS = (("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"))
+_APART = 3.0  # sds of their distance by which left and right are apart in a view that shows the direction
 
 
 class PersonKeypoints:
@@ -127,6 +129,34 @@ class PersonKeypoints:
         swapped = replace(keypoints, names=tuple(names[k] for k in other_sides(names)))
         legs = [self._distances(frame, estimate, one, _LEG_JOINTS) for one in (keypoints, swapped)]
         return not len(legs[0]) or bool(min(distances.mean() for distances in legs) < _AGREE)
+
+    def faces(self, frame: Frame, estimate: Estimate) -> bool | None:
+        """Whether the trunk in the keypoints faces as the estimate does; None if the view does not show it.
+
+        False if left and right are swapped at shoulders and hips together.
+        """
+        return _most(
+            [self._faces(frame, estimate), *(one.faces(view, estimate) for one, view in self._views(frame))]
+        )
+
+    def _faces(self, frame: Frame, estimate: Estimate) -> bool | None:
+        """Answer the same for the first camera."""
+        keypoints = self.choose(frame, estimate)
+        if keypoints is None:
+            return None
+        theirs, ours = tuple(keypoints.names), estimate.joint_names
+        expected = self.joints_in(frame, estimate)
+        uv, sd = np.asarray(keypoints.uv, float), np.broadcast_to(keypoints.sd, len(theirs))
+        same = []
+        for pair in _TRUNK_PAIRS:
+            if not (set(pair) <= set(theirs) and set(pair) <= set(ours)):
+                return None
+            (a, b), (c, d) = ([names.index(name) for name in pair] for names in (theirs, ours))
+            found, wanted = uv[a] - uv[b], expected[c] - expected[d]
+            if not (np.isfinite(found).all() and np.hypot(*wanted) > _APART * np.hypot(sd[a], sd[b])):
+                return None
+            same.append(float(found @ wanted) > 0)
+        return any(same)
 
     def _views(self, frame: Frame) -> Iterator[tuple[PersonKeypoints, Frame]]:
         """Yield the views of further cameras at the time of a frame."""

@@ -101,6 +101,9 @@ class PersonShapes:
         """Whether shapes do not contradict the estimate just judged."""
         return self.agree(frame, estimate) is not False
 
+    def faces(self, frame: Frame, estimate: Estimate) -> None:
+        """Return None: a shape looks the same from the front and from behind."""
+
     def _box(self, frame: Frame, estimate: Estimate) -> Box | None:
         """Return the box of the estimated body; None if part of it is behind the camera."""
         expected = frame.camera(self._camera).project(estimate.joints)

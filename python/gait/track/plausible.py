@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,11 +16,13 @@ from gait.track.person_shapes import PersonShapes
 
 _DEPARTURE = 0.6  # metres in one second by which the pelvis may depart from the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
+_TURNED_S = 0.25  # of the last second, in which keypoints show the trunk facing the other way
 _LEAST_SD = 0.05  # metres; least standard deviation of a stature
 _ELSEWHERE = "the person detected in the image does not match"
 _NO_WALK = "the path does not match the strides, or the stature is unusual"
 _UNSEEN = "the images hardly show the person"
 _OTHERS_FIT = "another direction, side or phase fits the image as well"
+_TURNED = "the detected joints show the person facing the other way"
 
 
 class Plausibility:
@@ -52,11 +54,11 @@ class Plausibility:
         self._keypoints = keypoints
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
         self.directions, self._travel = directions, 1.0 - belt
-        self._path: deque[tuple[float, ...]] = deque()  # times, places, velocities
+        self._second: deque[tuple[float, ...]] = deque()  # times, places, velocities, seconds turned
 
     def restart(self) -> None:
-        """Forget the path, since the track starts again elsewhere."""
-        self._path.clear()
+        """Forget the last second, since the track starts again elsewhere."""
+        self._second.clear()
         self._keypoints.restart()
 
     def judged(self, frame: Frame, estimate: Estimate) -> Estimate:
@@ -64,9 +66,13 @@ class Plausibility:
 
         The reason of an estimate that is `ambiguous` already is added, unless only left and right are open.
         """
-        walks = self._walks(frame.time, estimate)
+        self._add(frame, estimate)
+        walks = self._walks(estimate)
         agree = self._keypoints.agree(frame, estimate)
         supported = not estimate.flags & Flag.UNSUPPORTED
+        turned = sum(row[-1] for row in self._second) > _TURNED_S
+        if turned and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
+            return replace(estimate, status=TrackStatus.AMBIGUOUS, reason=_TURNED)
         if estimate.status == TrackStatus.AMBIGUOUS and estimate.flags & Flag.OTHERS_FIT:
             return replace(estimate, reason=_OTHERS_FIT)
         if estimate.status != TrackStatus.TRACKING or agree or (agree is None and walks and supported):
@@ -74,18 +80,38 @@ class Plausibility:
         reason = _ELSEWHERE if agree is not None else _NO_WALK if supported else _UNSEEN
         return replace(estimate, status=TrackStatus.AMBIGUOUS, reason=reason)
 
-    def _walks(self, time: float, estimate: Estimate) -> bool:
-        """Whether the stature is plausible and the path of the last second agrees with strides and heading.
+    def judged_later(self, found: Sequence[tuple[Frame, Estimate]]) -> list[Estimate]:
+        """Judge the estimates of a whole track, in order.
 
-        `time`: seconds; it may decrease.
+        Where the person seems to face the other way, the second before, which led to it, is `ambiguous` too.
         """
+        self.restart()
+        judged = [self.judged(frame, estimate) for frame, estimate in found]
+        turned = np.inf  # time of the next such frame
+        for i in reversed(range(len(judged))):
+            time, now = found[i][0].time, judged[i]
+            if now.status == TrackStatus.AMBIGUOUS and now.reason == _TURNED:
+                turned = time
+            elif now.status == TrackStatus.TRACKING and turned - time <= 1.0:
+                judged[i] = replace(now, status=TrackStatus.AMBIGUOUS, reason=_TURNED)
+            turned = np.inf if now.frame == 0 else turned  # a start
+        return judged
+
+    def _add(self, frame: Frame, estimate: Estimate) -> None:
+        """Add an estimate to the last second; the frames' times may decrease."""
+        since = abs(frame.time - self._second[-1][0]) if self._second else 0.0
+        turned = since if self._keypoints.faces(frame, estimate) is False else 0.0
         heading = estimate.mean.heading
         speed = self.directions[estimate.motion_class] * estimate.speed * self._travel
-        self._path.append((time, *estimate.mean.pelvis[:2], speed * np.cos(heading), speed * np.sin(heading)))
-        while abs(time - self._path[0][0]) > 1.0:
-            self._path.popleft()
-        path = np.array(self._path)
-        times, places, velocities = path[:, 0], path[:, 1:3], path[:, 3:]
+        velocity = speed * np.cos(heading), speed * np.sin(heading)
+        self._second.append((frame.time, *estimate.mean.pelvis[:2], *velocity, turned))
+        while abs(frame.time - self._second[0][0]) > 1.0:
+            self._second.popleft()
+
+    def _walks(self, estimate: Estimate) -> bool:
+        """Whether the stature is plausible and the last second's path agrees with strides and heading."""
+        path = np.array(self._second)
+        times, places, velocities = path[:, 0], path[:, 1:3], path[:, 3:5]
         walked = (velocities[1:] * (times[1:] - times[:-1])[:, None]).sum(axis=0)
         departure = float(np.hypot(*(places[-1] - places[0] - walked)))
         usual = abs(estimate.mean.stature - self._stature) < _BEYOND * self._stature_sd
