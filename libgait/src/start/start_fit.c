@@ -7,13 +7,13 @@
 
 enum { N = START_UNKNOWNS, LD = START_LD };
 
-static const double RATE_SD_HZ = 0.15; /* strides per second: people in films walk as slowly as they like */
-static const double SPEED_SD = 0.4;    /* metres per second, about the speed of the steps */
-static const double STILL_SD = 0.1;    /* metres per second, in place */
-static const double FLOOR_SD = 0.03;   /* metres: a camera's height is not exact */
-static const double PLACE_SD = 3.0;    /* metres, about where the length of the legs puts the person */
-static const double UNUSUAL =
-    8.0; /* twice the log odds of the first class over another, of a path over in place */
+static const double RATE_SD_HZ = 0.15;  /* strides per second: people in films walk as slowly as they like */
+static const double SPEED_SD = 0.4;     /* metres per second, about the speed of the steps */
+static const double STILL_SD = 0.1;     /* metres per second, in place */
+static const double FLOOR_SD = 0.03;    /* metres: a camera's height is not exact */
+static const double PLACE_SD = 3.0;     /* metres, about where the length of the legs puts the person */
+static const double IN_PLACE = 8.0;     /* twice the log odds of walking along a path over walking in place */
+static const double OTHER_CLASS = 16.0; /* the same, of the model's first class over another */
 static const double DEGREES = 4.0;      /* of freedom of the keypoints' errors */
 static const double BEHIND_SDS = 1e3;   /* standard deviations for joints behind the camera */
 static const double LEAD = 0.1;         /* statures: the foot lower in the image is nearer than the body */
@@ -151,7 +151,7 @@ static void costs(const gait_start *s, const state_layout *layout, const double 
 {
     start_scratch *const w = s->scratch;
     double const odds =
-        (in_place && !w->problem.person ? UNUSUAL : 0.0) + (layout == s->layout ? 0.0 : UNUSUAL);
+        (in_place && !w->problem.person ? IN_PLACE : 0.0) + (layout == s->layout ? 0.0 : OTHER_CLASS);
     memset(chi2, 0, (size_t)lanes * sizeof *chi2);
     for (int32_t k = 0; k < w->problem.frames; k++) {
         int32_t const rows = frame_residuals(s, layout, k, theta, lanes);
