@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,8 @@ import pytest
 
 import gait
 from gait.bindings.estimate import Estimate
-from gait.body.skeleton import JOINTS
+from gait.body.motion_classes import class_sections
+from gait.body.skeleton import JOINTS, points
 from gait.cli import main
 from gait.errors import GaitError, UserError
 from gait.io import blob, track_file
@@ -23,6 +25,7 @@ from gait.learn.classes import standing
 from gait.learn.classes.join import Change, MotionClass, join
 from gait.learn.corpus.load import NothingLeft
 from gait.learn.options import LearnOptions, SegmentOptions
+from gait.learn.prior.level import level_components
 from gait.learn.prior.model import meta_section, origin
 from gait.motion.verdict import verdict_of
 from gait.report.run_page import Run, run_page
@@ -84,6 +87,31 @@ def test_the_blob_names_its_classes(model: gait.Model) -> None:
     assert gait.Model(SHIPPED).classes[0] == "walk"
 
 
+def feet_lifted(sections: Mapping[str, blob.Array]) -> float:
+    """Most by which a sd of a component lifts or lowers the feet that stand, statures."""
+    names = blob.unpack_names(sections["PTNM"])
+    feet = [names.index(f"{side}_{part}") for side in "lr" for part in ("heel", "toe")]
+    height = blob.unpack_names(sections["CHNM"]).index("root_height")
+
+    def lowest(curve: np.ndarray) -> np.ndarray:
+        return points(sections, curve)[:, feet, 2].min(axis=1) + curve[:, height]
+
+    mean, *components = np.asarray(sections["CURV"], float)
+    stands = np.argsort(lowest(mean))[: len(mean) // 3]
+    return max(float(abs(np.mean((lowest(mean + c) - lowest(mean - c))[stands]) / 2)) for c in components)
+
+
+def test_components_leave_the_feet_on_the_floor() -> None:
+    four, alone = blob.read(CLASSES), blob.read(SHIPPED)
+    assert feet_lifted(four) < 1e-5 and feet_lifted(class_sections(four, 3)) < 1e-5
+    assert feet_lifted(alone) > 0.003  # as learnt alone
+    curves = level_components(alone, alone)
+    assert feet_lifted(alone | {"CURV": curves}) < 1e-5
+    change, height = curves - alone["CURV"], blob.unpack_names(alone["CHNM"]).index("root_height")
+    assert not np.delete(change, height, axis=2).any() and not change[0].any()
+    assert np.allclose(change, change.mean(axis=1, keepdims=True), atol=2e-6)  # the same at every phase
+
+
 def test_classes_that_do_not_fit_are_refused() -> None:
     walk, three = blob.read(SHIPPED), classes()
     with pytest.raises(UserError, match="give each its own name"):
@@ -110,6 +138,7 @@ def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.
     assert "class stand: derived from the walk, stands still, 4 components" in printed
     assert "class backwards: the curves of walk in reverse" in printed
     assert gait.Model(out).classes == ("walk", "stand", "backwards")
+    assert feet_lifted(blob.read(out)) < 1e-5
     page = (tmp_path / "report" / "index.html").read_text()
     assert '<a href="#classes">Classes of motion</a>' in page
     assert (

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gait.bindings.model import read_cyclic
-from gait.body.motion_classes import class_names, class_sections, first_class
+from gait.body.motion_classes import CLASS_TAGS, class_names, class_sections, first_class
 from gait.errors import UsageError, UserError
 from gait.io import blob
 from gait.learn.arrays import Floats, column_means
@@ -24,6 +24,7 @@ from gait.learn.corpus.sources import find, subjects
 from gait.learn.cycles.verdict import NAMES
 from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.prior import model
+from gait.learn.prior.level import level_components
 from gait.learn.report.classes import figures as class_figures
 from gait.learn.run import Note, check, run
 from gait.learn.solve import readers
@@ -78,9 +79,10 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
             "walks are followed worse; learn it again from its recordings, together with the classes"
         )
     learnt, posture = dict[str, MotionClass](), None
+    taken = {name for name, source in wanted.items() if Path(source).suffix == MODEL}
     used = set[str]()  # files among the sources that are learnt as another class
     for name, source in wanted.items():
-        if Path(source).suffix == MODEL:
+        if name in taken:
             learnt[name] = _taken(name, source)
         elif name == STAND:
             posture = _posture(source, options, note) if source else None
@@ -101,6 +103,8 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
             walk, [{"credits": options.credit}, *(blob.read_meta(one.own or {}) for one in every)]
         )
         joined = join(changes.with_numbers_of(credited, kept), every)
+        level = names if own is None else learnt.keys() - taken
+        joined |= _level_curves(joined, [k for k, name in enumerate(names) if name in level])
         return changes.with_changes(joined, _observed(joined, options, note)) if options.changes else joined
 
     if own is not None:
@@ -112,6 +116,15 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         )
         data = Path(options.output).read_bytes()
     return figures | {"classes": class_figures(blob.decode(data))}
+
+
+def _level_curves(joined: Mapping[str, blob.Array], learnt: Sequence[int]) -> dict[str, blob.Array]:
+    """Return the curves, of those classes that take strides and have their own, with level components."""
+    own = [k for k in learnt if joined["CLIN"][k][0] != 0 and joined["CLIN"][k][1] == k]
+    return {
+        CLASS_TAGS["CURV"].format(k) if k else "CURV": level_components(class_sections(joined, k), joined)
+        for k in own
+    }
 
 
 def _only_changes(own: Mapping[str, blob.Array] | None, options: LearnOptions, note: Note) -> dict[str, Any]:
