@@ -103,7 +103,7 @@ LEGEND = (
     "phase%: error of the phase; flip%: frames half a cycle off; far%: frames with a root error above "
     "150 mm or reported as lost; twice%: the same, with frames under tracking counted twice; c90: share "
     "of joint coordinates inside the 90 % intervals; HS%: heel strikes within 2 frames; from: first "
-    "frame tracked; ms: time of a step, processor time if the start is the truth. "
+    "frame tracked; ms: time of a step, that of its thread if the start is the truth. "
     "Table of intervals and status: lost: frames reported as lost; "
     "PIT chi2: distance of the probability integral transform from a flat histogram of 10 bins; z2: "
     "squared error divided by the variance, 1 is right; NEES: error of all joints in units of the "
