@@ -108,7 +108,8 @@ GAIT_API gait_result gait_start_box_stature(const gait_start *s, const gait_box 
 /* Forget the frames. */
 GAIT_API void        gait_start_reset(gait_start *s);
 /* Fit the keypoints or, if there are too few, the boxes of each person, and return at most `capacity` hypotheses for
- * the moment `utime`, the most probable first.
+ * the moment `utime`, the most probable first.  Those of keypoints are of any class of motion that takes strides, those
+ * of boxes of the first.
  * GAIT_ERR_STATE: too few frames; it takes four with hips and ankles over 0.3 s, or eight with a box of the same
  * person over config box_time.  GAIT_ERR_NUMERIC: nothing fits. */
 GAIT_API gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity,

@@ -233,7 +233,7 @@ class Followed:
     sd: NDArray[np.float64]  #: (n, 15, 3)
     tracking: NDArray[np.bool_]  #: (n,) status
     motion_class: list[str]
-    phase: NDArray[np.float64]  #: (n,) NaN while the person stands
+    phase: NDArray[np.float64]  #: (n,) NaN where a track file has none
 
 
 def _run(clip: Clip, source: str, seed: int) -> Run:
@@ -252,7 +252,7 @@ def _run(clip: Clip, source: str, seed: int) -> Run:
     root = np.linalg.norm(off - off[:, HIPS].mean(axis=1, keepdims=True), axis=2).mean(axis=1)
     under = followed.tracking
     frames = max(int(under.sum()), 1)
-    judged = under & (classes != STANDING) & (reported != STANDING)
+    judged = under & (classes != STANDING) & (reported != STANDING) & np.isfinite(followed.phase)
     return Run(
         clip.name,
         Path(source).stem,
@@ -388,9 +388,9 @@ def _time_of_classes(clip: Clip) -> str:
     spent: list[list[float]] = [[] for _ in models]
     for frame in video.frames():
         for tracker, times in zip(trackers, spent, strict=True):
-            before = time.process_time()
+            before = time.thread_time()
             tracker.step(frame.image, frame.utime)
-            times.append(time.process_time() - before)
+            times.append(time.thread_time() - before)
     ratio, of_four = (float(np.median(np.array(times) / np.array(spent[0]))) for times in spent[1:])
     verdict = "reached" if ratio <= DEARER else "missed"
     three_names, four_names = (", ".join(model.classes) for model in models[1:])
@@ -403,7 +403,7 @@ def _time_of_classes(clip: Clip) -> str:
 
 
 def _rows(runs: list[Run]) -> Iterator[tuple[object, ...]]:
-    """Medians over the seeds, with both models side by side."""
+    """Medians over the seeds, with the models side by side."""
     for clip in dict.fromkeys(run.clip for run in runs):
         for model in dict.fromkeys(run.model for run in runs):
             these = [run for run in runs if run.clip == clip and run.model == model]

@@ -22,15 +22,18 @@ NAMES = ("l_hip", "r_hip", "l_ankle", "r_ankle")
 STANDS, WALKS = 20, 90  # frames
 
 
-def track(path, stands, view=None, rate=0.9, depth_sd=0.0):
+def track(path, stands, view=None, rate=0.9, depth_sd=0.0, motion="walk"):
     """Write the track of a person who stands for some frames while the estimated phase moves on; read it."""
+    directions = {"walk": 1, "backwards": -1}
     view = view or camera()
     seconds = np.arange(stands + WALKS) / FPS
     order = [MODEL.joint_names.index(name) for name in NAMES]
     noise = np.random.default_rng(1)
     estimates, observed = [], {}
     for k, time in enumerate(seconds):
-        state = state_at(MODEL, SECTIONS, max(0.0, time - seconds[stands]), phase=0.3, rate=rate)
+        state = state_at(
+            MODEL, SECTIONS, directions[motion] * max(0.0, time - seconds[stands]), phase=0.3, rate=rate
+        )
         joints = MODEL.pose(state)[0]
         observed[k] = FrameKeypoints(NAMES, view.project(joints[order]) + noise.normal(0, 0.3, (4, 2)))
         phase = state.phase if k > stands else 0.3 - 0.1 * (1 - k / max(stands, 1))
@@ -39,13 +42,14 @@ def track(path, stands, view=None, rate=0.9, depth_sd=0.0):
         sd = State(phase=0.02, stride_hz=0.02, pelvis=np.array([depth_sd, 0.0, 0.0]), coef=np.zeros(5))
         estimates.append(
             Estimate(round(1e6 * time), k, TrackStatus.TRACKING, Flag(0), -80.0, 100.0, 1.0, 1.0, 1.3 * rate,
-                     mean, sd, mean, joints, np.full((len(joints), 3), 0.02), np.zeros(24), MODEL.joint_names)
+                     mean, sd, mean, joints, np.full((len(joints), 3), 0.02), np.zeros(24), MODEL.joint_names,
+                     motion)
         )  # fmt: skip
     with TrackWriter(path, 5, MODEL.joint_names, MODEL.angle_names) as rows:
         found = (
             (Frame(k, time, None), one) for k, (time, one) in enumerate(zip(seconds, estimates, strict=True))
         )
-        for frame, estimate in Standing(PersonKeypoints(view, {1: observed}, 1)).decided(found):
+        for frame, estimate in Standing(PersonKeypoints(view, {1: observed}, 1), directions).decided(found):
             rows.write(frame, estimate)
     return read_track(path)
 
@@ -68,7 +72,8 @@ def test_who_walks_keeps_every_phase(tmp_path):
     assert np.isfinite(track(tmp_path / "t.csv", 0).phase).all()
 
 
-def test_who_walks_slowly_towards_a_far_camera_keeps_every_phase(tmp_path):
+@pytest.mark.parametrize("motion", ["walk", "backwards"])
+def test_who_walks_slowly_towards_a_far_camera_keeps_every_phase(tmp_path, motion):
     far = Camera.looking((16.0, 0.0, 1.4), (0.0, 0.0, 0.9), SIZE, 1600.0)
-    rows = track(tmp_path / "t.csv", 0, far, rate=0.5, depth_sd=0.2)
+    rows = track(tmp_path / "t.csv", 0, far, rate=0.5, depth_sd=0.2, motion=motion)
     assert np.isfinite(rows.phase).all()

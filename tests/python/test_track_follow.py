@@ -438,6 +438,20 @@ def test_a_smoothed_track_is_ambiguous_for_the_second_before_too(of_sides):
     assert [now.status for now in plausible.judged_later(rows[:39])] == [TrackStatus.TRACKING] * 39
 
 
+def test_what_was_before_a_start_does_not_count_after_it(of_sides):
+    plausible, rows = of_sides(np.pi / 2, swapped(), range(12, 20))
+    found = [(frame, replace(now, frame=frame.number - 20)) for frame, now in rows]
+    judged = plausible.judged_later(found)
+    assert [now.status for now in judged[20:]] == [TrackStatus.TRACKING] * 20
+    assert judged[19].status == TrackStatus.AMBIGUOUS
+
+
+def test_a_single_frame_does_not_show_the_other_way_at_any_rate(of_sides):
+    plausible, rows = of_sides(np.pi / 2, swapped(), [5])
+    slow = [(Frame(frame.number, frame.number / 3, FRAMES[0]), now) for frame, now in rows]
+    assert {plausible.judged(*row).status for row in slow} == {TrackStatus.TRACKING}
+
+
 class Walks(Script):
     """A tracker of a steady walk, which records the phases of its starts; those of hypotheses are open."""
 

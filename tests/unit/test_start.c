@@ -92,9 +92,9 @@ static void show(gait_start *s, const walk *w, int frames)
     }
 }
 
-static gait_hypothesis find_with(const gait_model *model, const walk *w)
+static gait_hypothesis find_with(const gait_model *model, const walk *w, uint32_t cpu_mask)
 {
-    gait_start *const s = toy_start_of(model, camera(), ~0u);
+    gait_start *const s = toy_start_of(model, camera(), cpu_mask);
     gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
     int32_t count = 0;
     show(s, w, FRAMES);
@@ -106,7 +106,7 @@ static gait_hypothesis find_with(const gait_model *model, const walk *w)
 
 static gait_hypothesis find(const walk *w)
 {
-    return find_with(toy_model(), w);
+    return find_with(toy_model(), w, ~0u);
 }
 
 static float turned(float a, float b)
@@ -179,7 +179,9 @@ static void test_backwards(void)
         w.phase = (float)k / 8.0f;
         w.noise = 2.0f;
         w.back = k % 2 == 0;
-        gait_hypothesis const h = find_with(toy_classes_model(), &w);
+        gait_hypothesis const h = find_with(toy_classes_model(), &w, ~0u),
+                              scalar = find_with(toy_classes_model(), &w, 0);
+        CHECK(!memcmp(&h, &scalar, sizeof h));
         check_found(&w, &h);
         CHECK(h.mean.motion_class == (w.back ? TOY_BACK : TOY_WALK) && gait_hypothesis_walks(&h));
     }

@@ -64,10 +64,10 @@ gait_start *start_layout(arena *a, const gait_model *m, const gait_start_config 
         s->cfg.stature = m->stature_mean;
     if (s->cfg.stature_sd == 0.0f)
         s->cfg.stature_sd = m->stature_sd;
-    s->layout[s->classes++] = state_layout_init(m, &plain, run);
+    s->layout[s->striding++] = state_layout_init(m, &plain, run);
     for (int32_t c = 1; c < m->classes; c++)
         if (m->of_class[c]->direction != 0)
-            s->layout[s->classes++] = state_layout_of_class(&s->layout[0], c);
+            s->layout[s->striding++] = state_layout_of_class(&s->layout[0], c);
     s->crown = height_of(s, find_point(m, "head_top"));
     start_reset(s);
     return s;

@@ -13,7 +13,7 @@ static const double STILL_SD = 0.1;     /* metres per second, in place */
 static const double FLOOR_SD = 0.03;    /* metres: a camera's height is not exact */
 static const double PLACE_SD = 3.0;     /* metres, about where the length of the legs puts the person */
 static const double IN_PLACE = 8.0;     /* twice the log odds of walking along a path over walking in place */
-static const double OTHER_CLASS = 16.0; /* the same, of the model's first class over another */
+static const double OTHER_ODDS = 16.0;  /* the same, of the model's first class over another */
 static const double DEGREES = 4.0;      /* of freedom of the keypoints' errors */
 static const double BEHIND_SDS = 1e3;   /* standard deviations for joints behind the camera */
 static const double LEAD = 0.1;         /* statures: the foot lower in the image is nearer than the body */
@@ -150,8 +150,8 @@ static void costs(const gait_start *s, const state_layout *layout, const double 
                   bool in_place, double *cost, double *chi2)
 {
     start_scratch *const w = s->scratch;
-    double const odds =
-        (in_place && !w->problem.person ? IN_PLACE : 0.0) + (layout == s->layout ? 0.0 : OTHER_CLASS);
+    double const odds = (in_place && !w->problem.person ? IN_PLACE : 0.0) +
+                        (layout->model->motion_class == 0 ? 0.0 : OTHER_ODDS);
     memset(chi2, 0, (size_t)lanes * sizeof *chi2);
     for (int32_t k = 0; k < w->problem.frames; k++) {
         int32_t const rows = frame_residuals(s, layout, k, theta, lanes);
@@ -293,7 +293,7 @@ static int32_t propose_mode(const gait_start *s, const state_layout *layout, boo
 static int32_t propose(const gait_start *s)
 {
     start_candidate *const c = s->scratch->candidate;
-    int32_t const classes = s->scratch->problem.person ? 1 : s->classes;
+    int32_t const classes = s->scratch->problem.person ? 1 : s->striding;
     int32_t n = 0;
     for (int32_t k = 0; k < classes; k++)
         for (int32_t in_place = 0; in_place < 2; in_place++) {

@@ -74,11 +74,12 @@ struct gait_start { /* observations, and what is known about the person */
     const gait_model *model;
     const kernels *run;
     gait_start_config cfg; /* camera: as it is now */
-    int32_t classes;
-    state_layout layout[GAIT_MAX_CLASSES]; /* of the classes that take strides, the model's first one first */
-    gait_state prior_sd;                   /* of what is not known about the person */
-    int32_t hip[2], ankle[2];              /* points of the model */
-    double crown;                          /* height of head_top over the floor while walking, statures */
+    int32_t striding;
+    state_layout
+        layout[GAIT_MAX_CLASSES]; /* of the classes that take strides: the model's first one, then others */
+    gait_state prior_sd;          /* of what is not known about the person */
+    int32_t hip[2], ankle[2];     /* points of the model */
+    double crown;                 /* height of head_top over the floor while walking, statures */
     int32_t count; /* frames of keypoints added, of which the last GAIT_START_MAX_FRAMES are kept */
     int64_t utime[GAIT_START_MAX_FRAMES];
     start_view view[GAIT_START_MAX_FRAMES];

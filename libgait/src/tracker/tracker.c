@@ -124,7 +124,7 @@ void tracker_start(gait_tracker *t, const gait_hypothesis *h, int32_t count, boo
     tracker_even_weights(t);
     core->last_supported = particle_from_state(&t->layouts[h->mean.motion_class], &h->mean);
     core->reported_phase = h->mean.phase;
-    core->reported_rate = h->mean.stride_hz;
+    core->reported_rate = h->mean.stride_hz * (float)t->layouts[h->mean.motion_class].model->direction;
     if (t->classes)
         draw_classes(t, from, n, total);
     else

@@ -50,7 +50,7 @@ class Hypothesis:
     mean, sd : State
         Normal distributions at the time asked for.
     speed, speed_sd : float
-        Along the heading, metres per second.
+        In the direction of the class of motion (against the heading if it is backwards), metres per second.
     probability : float
         Relative to all hypotheses found.
     chi2_per_observation : float

@@ -150,7 +150,7 @@ def write(
         if options.smooth:
             estimates = _smoothed(options, scene, tracker, estimates, plausibility)
         if keypoints is not None:
-            estimates = Standing(keypoints).decided(estimates)
+            estimates = Standing(keypoints, tracker.model.directions).decided(estimates)
         if also is not None:
             estimates = _passed(estimates, also)
         elif keypoints is not None and scene.further:

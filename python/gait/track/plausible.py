@@ -17,6 +17,7 @@ from gait.track.person_shapes import PersonShapes
 _DEPARTURE = 0.6  # metres in one second by which the pelvis may depart from the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
 _TURNED_S = 0.25  # of the last second, in which keypoints show the trunk facing the other way
+_FRAME_S = 0.1  # for which one frame of them counts at most
 _LEAST_SD = 0.05  # metres; least standard deviation of a stature
 _ELSEWHERE = "the person detected in the image does not match"
 _NO_WALK = "the path does not match the strides, or the stature is unusual"
@@ -64,7 +65,8 @@ class Plausibility:
     def judged(self, frame: Frame, estimate: Estimate) -> Estimate:
         """Change `tracking` to `ambiguous` unless keypoints or, without any, images and walk support it.
 
-        The reason of an estimate that is `ambiguous` already is added, unless only left and right are open.
+        It also becomes `ambiguous` while the person seems to face the other way.  The reason of an estimate
+        that is `ambiguous` already is added, unless only left and right are open.
         """
         self._add(frame, estimate)
         walks = self._walks(estimate)
@@ -86,7 +88,11 @@ class Plausibility:
         Where the person seems to face the other way, the second before, which led to it, is `ambiguous` too.
         """
         self.restart()
-        judged = [self.judged(frame, estimate) for frame, estimate in found]
+        judged: list[Estimate] = []
+        for frame, estimate in found:
+            if estimate.frame == 0:  # a start
+                self.restart()
+            judged.append(self.judged(frame, estimate))
         turned = np.inf  # time of the next such frame
         for i in reversed(range(len(judged))):
             time, now = found[i][0].time, judged[i]
@@ -94,13 +100,13 @@ class Plausibility:
                 turned = time
             elif now.status == TrackStatus.TRACKING and turned - time <= 1.0:
                 judged[i] = replace(now, status=TrackStatus.AMBIGUOUS, reason=_TURNED)
-            turned = np.inf if now.frame == 0 else turned  # a start
+            turned = np.inf if now.frame == 0 else turned
         return judged
 
     def _add(self, frame: Frame, estimate: Estimate) -> None:
         """Add an estimate to the last second; the frames' times may decrease."""
         since = abs(frame.time - self._second[-1][0]) if self._second else 0.0
-        turned = since if self._keypoints.faces(frame, estimate) is False else 0.0
+        turned = min(since, _FRAME_S) if self._keypoints.faces(frame, estimate) is False else 0.0
         heading = estimate.mean.heading
         speed = self.directions[estimate.motion_class] * estimate.speed * self._travel
         velocity = speed * np.cos(heading), speed * np.sin(heading)

@@ -9,7 +9,7 @@ one foot, there is none after that until both feet have struck.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,10 +45,12 @@ class Standing:
     Parameters
     ----------
     keypoints : PersonKeypoints
+    directions : mapping of str to int
+        `Model.directions`.
     """
 
-    def __init__(self, keypoints: PersonKeypoints) -> None:
-        self._keypoints = keypoints
+    def __init__(self, keypoints: PersonKeypoints, directions: Mapping[str, int]) -> None:
+        self._keypoints, self._directions = keypoints, directions
         self._held: deque[_Held] = deque()
         self._strikes = 2  # since the person stood last
         self._half = 0  # half strides of the last phase
@@ -80,7 +82,7 @@ class Standing:
         if not np.hypot(*sd.T).max() < _LEAST_ANKLE_SD:  # also false if any is NaN
             return False
         heading = [held.estimate.mean.heading for held in self._held]
-        speed = [held.estimate.speed for held in self._held]
+        speed = [self._directions[held.estimate.motion_class] * held.estimate.speed for held in self._held]
         place = [held.estimate.mean.pelvis[:2] for held in self._held]
         seconds = self._held[-1].frame.time - self._held[0].frame.time
         way = np.mean(speed * np.array([np.cos(heading), np.sin(heading)]), axis=1) * seconds
