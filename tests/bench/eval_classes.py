@@ -43,7 +43,7 @@ from gait.bindings.model import read_cyclic
 from gait.body.motion_classes import of_class
 from gait.body.skeleton import EVAL15
 from gait.io import blob
-from gait.io.track_file import Joints, read_estimates, read_truth
+from gait.io.track_file import STANDING, Joints, read_estimates, read_true_phase, read_truth
 from gait.io.video import read_plate
 from gait.motion.evaluate import coverage, phase_errors
 from gait.motion.footfalls import strikes_of
@@ -63,7 +63,6 @@ RUNNING = "running"  # clip of eval_simulated
 TIMED = "walk"  # a clip that all models follow: a tracker that searches for a person has twice the particles
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 ANKLES = [EVAL15.index("l_ankle"), EVAL15.index("r_ankle")]
-STANDING = "stand"  # the class without a phase
 STANCE = 0.2  # m/s: the ankle of a foot that stands is slower
 FAR = 0.15  # metres, root-aligned: a wrong frame
 DELAY = 0.5  # seconds for which the class before a change may be reported
@@ -336,10 +335,9 @@ def foot_speed(followed: Followed, truth: Joints, moves: NDArray[np.bool_]) -> f
 def _phases(clip: Clip, truth: Joints) -> NDArray[np.float64]:
     """True phase of every frame: as simulated, or between the recorded heel strikes."""
     assert clip.truth is not None
-    with clip.truth.open(newline="", encoding="utf-8") as file:
-        simulated = [float(row["phase"]) for row in csv.DictReader(file) if "phase" in row]
-    if simulated:
-        return np.array(simulated)
+    simulated = read_true_phase(clip.truth)
+    if simulated is not None:
+        return simulated
     between = strikes_of(truth, clip.folder / "meta.json").phase(truth.frame)
     assert between is not None
     return between

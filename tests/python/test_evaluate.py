@@ -16,7 +16,7 @@ from gait.body import skeleton
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.cli import main
 from gait.io import blob
-from gait.io.track_file import Joints, Track, read_estimates, read_truth, write_lifted
+from gait.io.track_file import Joints, Track, read_estimates, read_true_phase, read_truth, write_lifted
 from gait.learn.segments import fit as segment_fit
 from gait.motion.evaluate import (
     LIMB_COLUMNS,
@@ -43,6 +43,7 @@ from gait.motion.footfalls import (
     strikes_of,
     walking_direction,
 )
+from gait.report.comparison import compare
 
 SECTIONS = blob.decode(read_blob(None))
 RATE, FIRST_PHASE, HEIGHT = 0.9, 0.3, 1.7
@@ -353,6 +354,52 @@ def test_a_model_of_segments_alone_is_refused_by_name(tmp_path):
     blob.write(path, segment_fit.sections(toy_prior(4, 3, 2, 1)))
     with pytest.raises(UserError, match="segments.gait: contains no cyclic model; learn it without"):
         read_cyclic(path)
+
+
+def cut(truth, first):
+    """Return the truth from row `first`."""
+    return Joints(truth.frame[first:], truth.time[first:], {n: at[first:] for n, at in truth.places.items()})
+
+
+def written_truth(folder, **columns):
+    """Write TRUTH to truth.csv, with further columns (n,) of text; return its path."""
+    head = [f"{name}_{axis}" for name in JOINTS for axis in "xyz"]
+    values = np.concatenate([TRUTH.places[name] for name in JOINTS], axis=1)
+    lines = [",".join(["frame", "time", *columns, *head])]
+    for i, row in enumerate(values):
+        cells = [str(i), f"{TRUTH.time[i]:.6f}", *(column[i] for column in columns.values())]
+        lines.append(",".join(cells + [f"{value:.6f}" for value in row]))
+    path = folder / "truth.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_phase_that_the_truth_states_is_the_true_one_also_if_it_falls(tmp_path):
+    """Between the strikes of the joints it would rise."""
+    count = len(TRUTH.frame)
+    falling = (0.9 - np.arange(count) / 33) % 1.0
+    classes = ["stand" if i < 20 else "backwards" for i in range(count)]
+    path = written_truth(tmp_path, phase=[f"{value:.6f}" for value in falling], motion_class=classes)
+    stated = read_true_phase(path)
+    assert np.isnan(stated[:20]).all()
+    np.testing.assert_allclose(stated[20:], falling[20:], atol=1e-6)
+    late = track(cut(TRUTH, 5), phase=(falling[5:] + 0.04) % 1.0)
+    found = evaluate(late, TRUTH, strikes=STRIKES, model=SECTIONS, phase=stated)["phase"]
+    assert found["flips"] == 0 and found["bias"] == pytest.approx(0.04, abs=1e-5)
+    assert evaluate(late, TRUTH, strikes=STRIKES, model=SECTIONS)["phase"]["flips"] > 0.3
+    compared = compare(replace(track(), phase=falling), str(path), None, None)
+    assert np.abs(compared.phase[20:]).max() < 1e-6 and np.isnan(compared.phase[:20]).all()
+
+
+def test_a_truth_need_not_state_a_phase_but_not_in_per_cent(tmp_path, capsys):
+    assert read_true_phase(written_truth(tmp_path)) is None
+    path = written_truth(tmp_path, phase=["0.5", *["37"] * (len(TRUTH.frame) - 1)])
+    with pytest.raises(UserError, match="truth.csv: line 3: phase is 37; give it in strides, from 0 to 1"):
+        read_true_phase(path)
+    places = np.stack([TRUTH.places[name] for name in JOINTS], axis=1)
+    write_lifted(tmp_path / "found.csv", TRUTH.frame, TRUTH.time, JOINTS, places, np.full_like(places, 0.1))
+    assert main(["eval", str(tmp_path / "found.csv"), "--truth", str(path)]) != 0
+    assert "line 3: phase is 37" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("rate", "reported"), [(30, False), (10, True)])

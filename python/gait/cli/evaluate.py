@@ -10,8 +10,9 @@ Prints, over the frames in both files, with an explanation of each line:
   the pose error of two baselines without images: the mean pose at the true position, and the mean stride
   continued from the true start.
 
-Heel strikes come from meta.json beside the truth (meta_2.json beside truth_2.csv), or else from the truth,
-where a heel is furthest in front of the pelvis.
+The true phase is the column phase of the truth, if it has one, or else rises evenly between heel strikes.
+These come from meta.json beside the truth (meta_2.json beside truth_2.csv), or else from the truth, where a
+heel is furthest in front of the pelvis.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     """Read the files, compare them, and print the errors."""
     from gait.bindings.model import read_cyclic
     from gait.camera.camera import Camera
-    from gait.io.track_file import read_estimates, read_truth
+    from gait.io.track_file import read_estimates, read_true_phase, read_truth
     from gait.motion.evaluate import evaluate
     from gait.motion.footfalls import meta_of, strikes_of
     from gait.report.error_table import OTHER_WORLD, as_text
@@ -78,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
         strikes=strikes_of(truth, meta_of(args.truth)),
         model=read_cyclic(args.model),
         camera=Camera.read(str(camera)) if camera else None,
+        phase=read_true_phase(args.truth),
     )
     print(json.dumps(measures) if args.json else as_text(measures))
     return 0

@@ -36,6 +36,7 @@ STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
 CLASS_COLUMN, CLASS_PREFIX = "motion_class", "p_"
+STANDING = "stand"  # class of a person without a phase
 CLIP_COLUMNS = ("reason", "first_frame", "last_frame")
 FILM_COLUMN = "film"
 PERSON_COLUMN = "person"
@@ -304,6 +305,22 @@ def read_truth(path: str | os.PathLike[str]) -> Joints:
     table = _Table(path, "truth")
     names = [name for name in JOINTS if name in EVAL15 or f"{name}_x" in table.rows]
     return Joints(table.frames(), table.numbers("time"), {name: table.vectors(name, "xyz") for name in names})
+
+
+def read_true_phase(path: str | os.PathLike[str]) -> Array | None:
+    """Read the phase (n,) that a truth file states, which falls while the person walks backwards.
+
+    NaN where the person stands; None if the file has no column of it.
+    """
+    table = _Table(path, "truth")
+    if "phase" not in table.rows:
+        return None
+    phase = table.numbers("phase")
+    if (wrong := (phase < 0) | (phase > 1)).any():
+        i = int(wrong.argmax())
+        raise UserError(f"{path}: line {i + 2}: phase is {phase[i]:g}; give it in strides, from 0 to 1")
+    classes = table.rows.get(CLASS_COLUMN, [""] * len(phase))
+    return np.where([name == STANDING for name in classes], np.nan, phase)
 
 
 def read_estimates(path: str | os.PathLike[str]) -> Track:

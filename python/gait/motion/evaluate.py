@@ -158,18 +158,26 @@ LIMB_COLUMNS = [i for i, name in enumerate(EVAL15) if name not in ("pelvis", "ne
 
 
 def evaluate(
-    track: Track, truth: Joints, *, strikes: Strikes, model: dict[str, Any], camera: Camera | None = None
+    track: Track,
+    truth: Joints,
+    *,
+    strikes: Strikes,
+    model: dict[str, Any],
+    camera: Camera | None = None,
+    phase: Array | None = None,
 ) -> Measures:
     """Compare the frames that a track and the truth have in common.
 
     `strikes`: heel strikes of the truth; `model`: sections of the model blob, for the baselines; `camera`:
-    for distances in the picture. Returns ``frames``; ``abs``, ``root`` (mm) and ``px``, each as ``median``,
-    ``mean``, ``p90``; ``lost`` (share); ``phase`` (cycles; see `phase_errors`); ``coverage`` (share) of the
-    ``50`` and ``90`` % intervals; ``static`` and ``free``: the baselines; ``root12``: like ``root``, over
-    shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D pose networks have; ``proc``: after
-    the best rotation, scale and shift of each frame, only for comparison with the literature; ``status``,
-    ``trust`` (see `trust`); ``calibration`` (see `calibration`). ``phase`` is None if no frame has both a
-    true and an estimated one, ``px`` if the camera is unknown. UserError if they have no frame in common.
+    for distances in the picture; `phase`: true phase (n,) of each frame of the truth, as from
+    `read_true_phase`, if it is not to be taken from the strikes. Returns ``frames``; ``abs``, ``root`` (mm)
+    and ``px``, each as ``median``, ``mean``, ``p90``; ``lost`` (share); ``phase`` (cycles; see
+    `phase_errors`); ``coverage`` (share) of the ``50`` and ``90`` % intervals; ``static`` and ``free``: the
+    baselines; ``root12``: like ``root``, over shoulders, elbows, wrists, hips, knees and ankles, the joints
+    that 2-D pose networks have; ``proc``: after the best rotation, scale and shift of each frame, only for
+    comparison with the literature; ``status``, ``trust`` (see `trust`); ``calibration`` (see `calibration`).
+    ``phase`` is None if no frame has both a true and an estimated one, ``px`` if the camera is unknown.
+    UserError if they have no frame in common.
     """
     common, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     if len(common) == 0:
@@ -177,7 +185,7 @@ def evaluate(
     found, true = track.eval15()[ours], truth.eval15()[theirs]
     status = np.array(track.status)[ours]
     given_up = status == "lost"
-    true_phase = strikes.phase(common)
+    true_phase = strikes.phase(common) if phase is None else phase[theirs]
     still = static_pose(model, truth)[theirs]
     free = free_run(model, truth, strikes, first=int(theirs[0]))
     return {

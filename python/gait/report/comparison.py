@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from gait.bindings.model import read_cyclic
 from gait.camera.camera import Camera
-from gait.io.track_file import Joints, Track, read_truth
+from gait.io.track_file import Joints, Track, read_true_phase, read_truth
 from gait.motion.evaluate import Measures, evaluate, root_errors
-from gait.motion.footfalls import Strikes, meta_of, strikes_of
+from gait.motion.footfalls import meta_of, strikes_of
 from gait.report.colours import BLUE, GREY, ORANGE
 from gait.report.error_table import ERROR_HEADER, OTHER_WORLD, error_rows, share_rows
 from gait.report.gait_parts import time_span, tint
@@ -51,21 +51,21 @@ class Comparison:
 def compare(track: Track, truth: str, model: str | None, camera: Camera | None) -> Comparison:
     """Compare a track with the file of the true motion; `model` and `camera` as for `evaluate`."""
     true = read_truth(truth)
-    strikes = strikes_of(true, meta_of(truth))
-    measures = evaluate(track, true, strikes=strikes, model=read_cyclic(model), camera=camera)
-    return _by_frame(measures, track, true, strikes)
+    strikes, stated = strikes_of(true, meta_of(truth)), read_true_phase(truth)
+    phase = strikes.phase(true.frame) if stated is None else stated
+    measures = evaluate(track, true, strikes=strikes, model=read_cyclic(model), camera=camera, phase=phase)
+    return _by_frame(measures, track, true, phase)
 
 
-def _by_frame(measures: Measures, track: Track, truth: Joints, strikes: Strikes) -> Comparison:
-    common, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
+def _by_frame(measures: Measures, track: Track, truth: Joints, phase: Array | None) -> Comparison:
+    _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
     found, true = track.eval15()[ours], truth.eval15()[theirs]
-    phase = strikes.phase(common)
     return Comparison(
         measures=measures,
         time=track.time[ours],
         abs_mm=1000 * np.linalg.norm(found - true, axis=2).mean(axis=1),
         root_mm=root_errors(found, true),
-        phase=None if phase is None else (track.phase[ours] - phase + 0.5) % 1.0 - 0.5,
+        phase=None if phase is None else (track.phase[ours] - phase[theirs] + 0.5) % 1.0 - 0.5,
         true_path=truth.places["pelvis"][theirs, :2],
     )
 
