@@ -431,6 +431,24 @@ def test_a_stop_brings_the_feet_together_without_a_slide(tmp_path: Path) -> None
     assert 0.9 < found["stride_period_s"] < 1.3 and found["stride_period_sd_s"] < 0.1  # without the stand
 
 
+@pytest.mark.parametrize("name", ["demo", "backwards"])
+def test_a_foot_rests_between_its_heel_strike_and_toe_off(name: str) -> None:
+    """Heel or toe rests while the foot stands; in a walk backwards it lands at the phase of a toe-off."""
+    stage = set_stage(replace(PRESETS[name], **TINY))
+    events, points = planned_events(stage), stage.walk.points()
+    timing, first = stage.walk.timing, stage.frames[0]
+    near = round(0.08 / timing.step)
+    for side in "lr":
+        paths = [points[f"{side}_{part}"] for part in ("heel", "toe")]
+        speeds = [np.linalg.norm(np.gradient(path, timing.step, axis=0), axis=1) for path in paths]
+        moves = np.min(speeds, axis=0)
+        for event, sign in (("heel_strike", 1), ("toe_off", -1)):
+            at = np.rint(first + timing.per_frame * events[f"{side}_{event}"]).astype(int)
+            at = at[(at > near) & (at < len(moves) - near)][1:-1]  # those at the ends are cut
+            assert len(at) >= 2
+            assert moves[at + sign * near].max() < 0.3 and moves[at - sign * near].min() > 0.5
+
+
 def test_backwards_moves_against_the_heading_and_turns_go_round() -> None:
     back = set_stage(replace(PRESETS["backwards"], **TINY))
     ahead = np.column_stack([np.cos(back.walk.heading[back.frames]), np.sin(back.walk.heading[back.frames])])

@@ -53,7 +53,10 @@ def find_events(stage: Stage) -> dict[str, Array]:
 
 
 def planned_events(stage: Stage) -> dict[str, Array]:
-    """Return the planned events of a walk that stops or goes backwards."""
+    """Return the planned events: a foot lands (heel_strike) and leaves the floor (toe_off).
+
+    In a walk backwards, whose phase falls, it lands at the phase of a toe-off and leaves at that of a strike.
+    """
     timing, first = stage.walk.timing, stage.frames[0]
     index = np.arange(len(timing.phase), dtype=float)
     forwards = timing.phase[-1] > timing.phase[0]
@@ -62,7 +65,8 @@ def planned_events(stage: Stage) -> dict[str, Array]:
         phase = timing.of_side(side)
         phase, at = (phase, index) if forwards else (phase[::-1], index[::-1])
         moving = np.append(True, np.diff(phase) > 0)
-        for event, share in (("heel_strike", 0.0), ("toe_off", TOE_OFF)):
+        lands, leaves = (0.0, TOE_OFF) if forwards else (TOE_OFF, 0.0)
+        for event, share in (("heel_strike", lands), ("toe_off", leaves)):
             whole = np.arange(np.ceil(phase[0] - share), np.floor(phase[-1] - share) + 1) + share
             out[f"{side}_{event}"] = np.sort(
                 (np.interp(whole, phase[moving], at[moving]) - first) / timing.per_frame
@@ -193,7 +197,8 @@ def describe(stage: Stage, made: Set, events: dict[str, Array], seed: int) -> di
             for name, times in planned_events(stage).items()
         },
         "events_note": "fractional 0-based video frames; heel strike: heel furthest ahead of the pelvis "
-        "(Zeni); toe-off: toe (MTP) furthest behind; contacts: as the walk was planned",
+        "(Zeni); toe-off: toe (MTP) furthest behind; contacts: as the walk was planned; "
+        "backwards: heel strike and toe-off are where the foot lands and leaves, as planned",
         "limb_lengths_m": {key: round(value, 4) for key, value in stage.body.lengths.items()},
         "stature_m": round(stage.body.stature, 4),
         "person_height_px": [round(float(q)) for q in np.percentile(tall, (0, 50, 100))],
