@@ -8,8 +8,10 @@ import subprocess
 import lcm_rig as rig
 import pytest
 
+from gait.bindings.model import model_file
 from gait.cli import main
 from gait.io.track_file import read_track
+from gait.lcm.demo import Demo
 
 COUNT = 20
 
@@ -88,6 +90,12 @@ def test_a_demo_whose_tracker_fails_reports_it_and_ends(folder, tmp_path):
     done = rig.gait("demo", *words)
     assert done.returncode == 1 and "gait-trackd: ended too early" in done.stderr, done.stderr
     assert not leftovers(out) and not list(out.iterdir())
+
+
+def test_the_demo_hands_the_daemon_the_file_of_a_shipped_model(tmp_path):
+    command = Demo(tmp_path, "gait-trackd", "classes", 1)._trackd("memq://")
+    file = model_file("classes")
+    assert command[command.index("--model") + 1] == str(file) and file.is_file() and file.is_absolute()
 
 
 def test_a_second_demo_in_the_same_folder_keeps_out(folder, tmp_path):

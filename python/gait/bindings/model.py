@@ -236,17 +236,28 @@ def pose_c(pose: CameraPose) -> abi.CameraPoseC:
     return c
 
 
+def model_file(path: str | os.PathLike[str] | None) -> Path:
+    """Return the path of a blob file, or of a blob of the package by its name; a file comes first."""
+    name = SHIPPED[0] if path is None else str(path)
+    if path is not None and (name not in SHIPPED or Path(path).is_file()):
+        return Path(path)
+    shipped = Path(str(resources.files("gait") / "data" / f"{name}.gait"))
+    if not shipped.is_file():
+        raise UserError(f"gait/data/{name}.gait: the package was built without its model; run make model")
+    return shipped
+
+
+def is_model(source: str) -> bool:
+    """Whether a source is a blob by its suffix, or by its name in the package unless a path has that name."""
+    return Path(source).suffix.lower() == ".gait" or (source in SHIPPED and not Path(source).exists())
+
+
 def read_blob(path: str | os.PathLike[str] | None) -> bytes:
     """Read a blob file, or a blob of the package by its name, and check its container."""
-    name = SHIPPED[0] if path is None else str(path)
-    if path is None or (name in SHIPPED and not Path(path).is_file()):
-        shipped = resources.files("gait") / "data" / f"{name}.gait"
-        if not shipped.is_file():
-            raise UserError(f"gait/data/{name}.gait: the package was built without its model; run make model")
-        return shipped.read_bytes()
-    require_file(path, "model file", "make one with gait learn")
-    contents = Path(path).read_bytes()
-    decode(contents, str(path))
+    file = model_file(path)
+    require_file(file, "model file", "make one with gait learn")
+    contents = file.read_bytes()
+    decode(contents, str(path or file))
     return contents
 
 

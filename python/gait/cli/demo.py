@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model",
         default=str(_MODEL),
         metavar="M.gait",
-        help="walking model (default: the shipped one)",
+        help="walking model: a file, or a model of the package: walk (default), paper or classes",
     )
     parser.add_argument(
         "--trackd",

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from gait.bindings.initial import Start
-from gait.bindings.model import Model
+from gait.bindings.model import Model, model_file
 from gait.camera.camera import Camera
 from gait.errors import UsageError, UserError
 from gait.io.fields import read_json
@@ -167,7 +167,7 @@ class Demo:
     output : Path
         Folder for the results.
     trackd, model : str
-        The tracker's program and its model.
+        The tracker's program and its model, a file or the name of one in the package.
     threads : int
         Threads of the tracker.
     video, camera, init, background, truth : str, optional
@@ -335,7 +335,7 @@ class Demo:
     def _trackd(self, url: str) -> list[str]:
         particles = ["--particles", str(self.particles)] if self.particles else []
         threads = ["--threads", str(self.threads)]
-        return [self.trackd, "--model", self.model, "--url", url, *threads, *particles]
+        return [self.trackd, "--model", str(model_file(self.model)), "--url", url, *threads, *particles]
 
     def _record(self, url: str) -> list[str]:
         files = ["-o", str(self.output / "track.csv"), "--log", str(self.output / "estimates.log")]
