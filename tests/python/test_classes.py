@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -159,6 +160,45 @@ def test_a_class_of_one_cycle_is_refused_and_nothing_is_written(
         "add recordings, 3 cycles at least"
     )
     assert not out.exists()
+
+
+def test_the_cycles_of_a_class_too_short_are_those_of_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mocap_files.write_toy(tmp_path / "limp", "21_01", period=120.0, frames=140)
+    words = ["-o", str(tmp_path / "m.gait"), "--quiet", "--jobs", "1"]
+    assert main(["learn", str(SHIPPED), *words, "--class", f"limp={tmp_path / 'limp'}"]) == 1
+    error = capsys.readouterr().err
+    found = re.search(
+        r"not learnt as 'limp': 1\.2 s of motion are ([0-9.]+) cycles \(at least 1\.5\)",
+        error,
+    )
+    assert found and float(found[1]) == pytest.approx(140 / 120, abs=0.03)
+
+
+def test_walks_the_other_way_are_refused_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mocap_files.write_toy(tmp_path / "ahead", "1_01", frames=400)
+    mocap_files.write_toy(tmp_path / "back", "1_01", frames=400, period=-120.0, speed=-1.3)
+    words = ["-o", str(tmp_path / "m.gait"), "--quiet", "--jobs", "1"]
+    assert (
+        main(
+            [
+                "learn",
+                str(SHIPPED),
+                *words,
+                "--class",
+                f"backwards={tmp_path / 'ahead'}",
+            ]
+        )
+        == 1
+    )
+    error = capsys.readouterr().err
+    assert "not learnt as 'backwards': the walk is forwards, or left and right are swapped" in error
+    assert "--class" not in error.split("not learnt")[1]
+    assert main(["learn", str(tmp_path / "back"), *words]) == 1
+    error = capsys.readouterr().err
+    assert "not learnt as 'walk': the walk is backwards, or left and right are swapped" in error
+    assert error.endswith("leave it out, or give --class backwards=FOLDER\n")
 
 
 def test_a_class_without_recordings_among_the_sources_is_an_error(

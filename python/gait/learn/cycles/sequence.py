@@ -91,7 +91,7 @@ def _short(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequen
     found = stride.find_by_steps(motion.angles, read.fps)
     if not kept.stop - kept.start < period.FEWEST_CYCLES * found.frames:
         return None
-    judged, channels, heading = _judge(motion, found, options.activity, by_steps=True)
+    judged, channels, heading = _judge(motion, found, options, by_steps=True)
     if not judged.accepted or not cutting.fewest_cycles(channels, found.frames, OBSERVED_PHASES):
         return None
     if _outside(motion.angles, read.fps, found.frames, options.period_mode, repeats=True):
@@ -103,23 +103,30 @@ def _short(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequen
 def _long(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequence:
     """Prepare a recording whose cycles repeat."""
     motion = _motion(read)
-    kept, found, mode, activity = steady.Kept(0, read.frames), None, options.period_mode, options.activity
+    kept, found, mode = steady.Kept(0, read.frames), None, options.period_mode
+    wanted = "backwards" if options.reverse else options.activity
     if options.trim:
         kept, found = steady.steady_part(motion.angles, read.fps, mode, motion.path)
         if not kept.stop - kept.start >= period.FEWEST_CYCLES * found.frames:
             outside = _outside(motion.angles, read.fps, found.frames, mode, repeats=False)
-            raise _refused(path, activity, outside or _unsteady(kept, found, read.fps))
+            words = outside or _too_short(motion.angles, read.fps) or _unsteady(kept, found, read.fps)
+            raise _refused(path, wanted, words)
+    whole = motion.angles
     if found is None or kept.stop - kept.start < read.frames:
         motion = _motion(read.part(kept.start, kept.stop))
         found = stride.find(motion.angles, read.fps, mode)
-    judged, channels, heading = _judge(motion, found, activity)
+    judged, channels, heading = _judge(motion, found, options)
     if outside := _outside(motion.angles, read.fps, found.frames, mode, judged.cyclic):
-        raise _refused(path, activity, outside)
+        raise _refused(path, wanted, outside)
+    if not judged.cyclic and (words := _too_short(whole, read.fps)):
+        raise _refused(path, wanted, words)
     if not judged.accepted:
-        other = judged.activity if {judged.activity, activity} == {"walk", "run"} else ""
-        raise _refused(path, activity, judged.reason, other)
+        remedy = "--activity " + judged.activity if {judged.activity, wanted} == {"walk", "run"} else ""
+        if judged.backwards and verdict.NAMES.get(wanted.lower()) == "walk":
+            remedy = "--class backwards=FOLDER"
+        raise _refused(path, wanted, judged.reason, remedy)
     if not cutting.fewest_cycles(channels, found.frames, OBSERVED_PHASES):
-        raise _refused(path, activity, "too little of each cycle is observed")
+        raise _refused(path, wanted, "too little of each cycle is observed")
     return _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
 
 
@@ -180,9 +187,21 @@ def _is_stride(angles: Floats, frames: float) -> bool:
 
 
 def _refused(path: Path, wanted: str, reason: str, other: str = "") -> UserError:
-    """Return the error for a recording that cannot be learnt as the activity, but perhaps as another."""
-    remedy = f"; leave it out, or give --activity {other}" if other else "; leave it out"
+    """Return the error for a recording not learnt as the activity; `other`: options that might help."""
+    remedy = f"; leave it out, or give {other}" if other else "; leave it out"
     return UserError(f"{path}: not learnt as {wanted!r}: {reason}{remedy}")
+
+
+def _too_short(angles: Floats, fps: float) -> str:
+    """Explain that angles (T, 24) are too short to repeat, by what both sides share, or return ''."""
+    moving = steady.active_part(angles, fps)
+    count, least = moving.stop - moving.start, period.FEWEST_CYCLES
+    if count < least * period.SECONDS[1] * fps:
+        part = angles[moving.start : moving.stop]
+        cycle = stride.find_by_steps(part, fps).frames
+        if count < least * cycle and stride.step_repeats(part, cycle) >= verdict.REPEATS:
+            return f"{count / fps:.1f} s of motion are {count / cycle:.2f} cycles (at least {least})"
+    return ""
 
 
 def _unsteady(kept: steady.Kept, found: period.Period, fps: float) -> str:
@@ -208,7 +227,7 @@ def _motion(read: Body | AngleTable) -> _Motion:
 
 
 def _judge(
-    motion: _Motion, found: period.Period, wanted: str, by_steps: bool = False
+    motion: _Motion, found: period.Period, options: LearnOptions, by_steps: bool = False
 ) -> tuple[verdict.Verdict, Floats, Floats]:
     """Return the verdict, channels (T, 30) and heading (T,); the last two are valid only if accepted."""
     frames, feet = len(motion.angles), None
@@ -220,7 +239,9 @@ def _judge(
         moving = motion.root
         feet = verdict.feet_of_channels(np.concatenate([motion.angles, moving], axis=1))
     footing = verdict.footing(feet, found.frames) if feet is not None else None
-    judged = verdict.judge(motion.angles, found, footing, wanted, moving[:, YAW], by_steps)
+    judged = verdict.judge(
+        motion.angles, found, footing, options.activity, moving[:, YAW], by_steps, options.reverse
+    )
     return judged, np.concatenate([motion.angles, moving], axis=1), heading
 
 

@@ -37,6 +37,7 @@ LEAST_LEG_ALTERNATION = 0.7
 LIFT = 0.02  # statures
 STEPS = 0.03  # statures
 LEAST_FORWARD_SHARE = 0.5  # the walks of CMU reach 0.98 and more, with left and right swapped -0.98 and less
+AHEAD = "ahead"  # name of evidence
 CYCLIC = ("cycles", "sharpness", "repeats")  # names of evidence
 
 
@@ -81,6 +82,11 @@ class Verdict:
         return all(e.accepted for e in self.evidence if e.name in CYCLIC)
 
     @property
+    def backwards(self) -> bool:
+        """Whether all evidence but that for walking ahead is accepted."""
+        return [e.name for e in self.evidence if not e.accepted] == [AHEAD]
+
+    @property
     def reason(self) -> str:
         """Why the recording is not accepted; '' if it is."""
         return "; ".join(str(e) for e in self.evidence if not e.accepted)
@@ -93,13 +99,14 @@ def judge(
     wanted: str,
     yaw: Floats | None = None,
     by_steps: bool = False,
+    reverse: bool = False,
 ) -> Verdict:
     """Judge the steady part of a recording: angles (T, 24), NaN where missing, and its period.
 
     `feet`: None if they are not visible.  `wanted`: activity to be learnt; names other than those of walking
     and running only require cycles.  `yaw` (T,): yaw of the pelvis from its direction of travel, radians, NaN
     where missing.  `by_steps`: cycles need not repeat, but each side must repeat the other
-    (`stride.find_by_steps`).
+    (`stride.find_by_steps`).  `reverse`: the recording is read in reversed time.
     """
     kind = NAMES.get(wanted.lower(), "")
     evidence = _repeating_steps(angles, found) if by_steps else _cyclic(angles, found)
@@ -116,8 +123,9 @@ def judge(
         if kind:
             evidence += _footing(feet, kind)
     if kind and yaw is not None and np.isfinite(yaw).any():
-        words = "the walk is backwards, or left and right are swapped"
-        evidence.append(Evidence("ahead", float(np.nanmean(np.cos(yaw))), LEAST_FORWARD_SHARE, words=words))
+        way = "forwards" if reverse else "backwards"
+        words = f"the walk is {way}, or left and right are swapped"
+        evidence.append(Evidence(AHEAD, float(np.nanmean(np.cos(yaw))), LEAST_FORWARD_SHARE, words=words))
     return Verdict(known, tuple(evidence))
 
 
