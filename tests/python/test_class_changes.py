@@ -81,7 +81,11 @@ def test_known_changes_are_learnt(tmp_path: Path, capsys: pytest.CaptureFixture[
         count.update((a, b) for a, b in pairwise(classes) if a != b)
         seconds.update(classes)
     out = tmp_path / "m.gait"
-    assert main(["learn", str(CLASSES), "-o", str(out), "--changes", str(tmp_path / "in"), "--quiet"]) == 0
+    assert main(["learn", str(CLASSES), "-o", str(out), "--changes", str(tmp_path / "in")]) == 0
+    line = next(line for line in capsys.readouterr().err.splitlines() if "--changes: " in line)
+    shown = re.search(r"--changes: (\d+) changes in 3 recordings: walk to stand (\d+), ", line)
+    assert shown and abs(int(shown[1]) - count.total()) <= 0.2 * count.total()
+    assert int(shown[1]) == sum(map(int, re.findall(r"[a-z] (\d+)", line.split("recordings: ")[1])))
     assumed, learnt = (read_cyclic(path)["CLSW"] for path in (CLASSES, out))
     assert min(count.values()) >= 3
     for (before, to), (_, phase) in KNOWN.items():

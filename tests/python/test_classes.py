@@ -311,6 +311,26 @@ def test_a_class_is_taken_from_a_model_by_its_name(
     assert not (tmp_path / "no.gait").exists()
 
 
+def test_shipped_models_are_taken_by_their_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for walk, four, out in (
+        ("walk", "classes", "a.gait"),
+        (str(SHIPPED), str(CLASSES), "b.gait"),
+    ):
+        assert main(["learn", walk, "-o", out, "--class", f"run={four}", "--quiet"]) == 0
+    assert Path("a.gait").read_bytes() == Path("b.gait").read_bytes()
+    assert main(["learn", "classes", "-o", "c.gait", "--class", "limp=walk"]) == 0
+    assert gait.Model("c.gait").classes == ("walk", "stand", "backwards", "run", "limp")
+    capsys.readouterr()
+    assert main(["learn", "classes", "-o", "d.gait"]) == 1
+    assert "classes: is a model, not a recording" in capsys.readouterr().err
+    Path("classes").mkdir()  # a folder of recordings comes first
+    assert main(["learn", "classes", "-o", "d.gait", "--class", "stand"]) == 1
+    assert "classes: no motion files" in capsys.readouterr().err
+
+
 def test_a_model_keeps_its_classes_and_the_name_of_the_first(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -392,6 +412,26 @@ def test_standing_is_learnt_from_people_who_stand(
         (["limp"], "--class limp: give recordings"),
         (["stand", "stand"], "--class stand: give each class its own name"),
         (["walk"], "--class walk: give each class its own name, not walk"),
+        (
+            ["Walk=in"],
+            "--class Walk=in: differs from the class walk only by case; rename it",
+        ),
+        (
+            ["limp=in", "Limp=in"],
+            "--class Limp=in: differs from the class limp only by case; rename it",
+        ),
+        (["x" * 80 + "=in"], "the name is longer than 31 bytes; shorten it"),
+        (["\u00e9" * 16 + "=in"], "the name is longer than 31 bytes; shorten it"),
+        (
+            ["a,b=in"],
+            "--class 'a,b=in': the name has a comma, quote, '=' or control character",
+        ),
+        (['a"b=in'], "the name has a comma, quote, '=' or control character"),
+        (
+            ["a\nb=in"],
+            "--class 'a\\nb=in': the name has a comma, quote, '=' or control character",
+        ),
+        (["a\udcff=in"], "the name has a comma, quote, '=' or control character"),
     ],
 )
 def test_bad_classes_are_one_line(
@@ -399,7 +439,27 @@ def test_bad_classes_are_one_line(
 ) -> None:
     options = [word for name in given for word in ("--class", name)]
     assert main(["learn", "nowhere", "-o", str(tmp_path / "m.gait"), *options]) == 2
-    assert words in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert words in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["x" * 80, "a=b"])
+def test_the_first_class_needs_a_name_that_fits_too(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [
+        "learn",
+        "nowhere",
+        "-o",
+        str(tmp_path / "m.gait"),
+        "--activity",
+        name,
+        "--class",
+        "stand",
+    ]
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert "--activity '" in error and ": the name " in error and error.count("\n") == 1
 
 
 def estimates(model: gait.Model) -> list[Estimate]:

@@ -12,8 +12,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gait.bindings.model import read_cyclic
+from gait.bindings.model import is_model, read_cyclic
 from gait.body.motion_classes import CLASS_TAGS, class_names, class_sections, first_class
+from gait.counts import count_of
 from gait.errors import UsageError, UserError
 from gait.io import blob
 from gait.learn.arrays import Floats, column_means
@@ -32,7 +33,8 @@ from gait.progress import progress
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk
-MODEL = ".gait"  # suffix
+UNFIT = ",\"'="  # for names of classes, which are in headers of track files
+MOST_SHOWN = 60  # most characters of an unfit name in an error
 T = TypeVar("T")
 STEP_CONCENTRATION = 6.0  # concentration with an sd of about a twentieth of a stride
 #: Rates of change from one class to another, per second at the most likely phase and pace, before recordings
@@ -60,7 +62,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
 
     A class is ``stand`` or ``backwards``, derived from the walk; or ``NAME=SRC``, learnt from those
     recordings (``backwards`` in reversed time, as a walk whose phase decreases; ``stand`` from people who
-    stand still) or taken from a model (``.gait``); or ``run``, learnt from the runs among the sources.  If
+    stand still) or taken from a model (`is_model`); or ``run``, learnt from the runs among the sources.  If
     the only source is a model, the classes are added to its own, or replace those of their names.  Returns
     the figures of the walk, with those of the classes under ``classes``.  With ``options.changes``, changes
     between the classes are learnt from those recordings; without classes they are those of a model.
@@ -68,7 +70,8 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     """
     own = read_cyclic(options.sources[0]) if adds_to_a_model(options) else None
     first = options.activity if own is None else first_class(own)
-    wanted, alone = _parsed(options, first), replace(options, classes=(), several=True)
+    names = class_names(own or {}) or [first]
+    wanted, alone = _parsed(options, names), replace(options, classes=(), several=True)
     if options.changes and not wanted:
         return _only_changes(own, options, note)
     if own is None:
@@ -79,7 +82,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
             "walks are followed worse; learn it again from its recordings, together with the classes"
         )
     learnt, posture = dict[str, MotionClass](), None
-    taken = {name for name, source in wanted.items() if Path(source).suffix == MODEL}
+    taken = {name for name, source in wanted.items() if is_model(source)}
     used = set[str]()  # files among the sources that are learnt as another class
     for name, source in wanted.items():
         if name in taken:
@@ -144,7 +147,16 @@ def _observed(sections: Mapping[str, blob.Array], options: LearnOptions, note: N
         return changes.count(sections, changes.frames_of(path, readers.read(path, options)))
 
     found = _each("--changes", options.changes, counted, options, note)
-    return reduce(add, found.values())
+    observed, names = reduce(add, found.values()), class_names(sections)
+    kinds = [
+        f"{names[i]} to {names[j]} {observed.counts[i, j]}" for i, j in np.argwhere(observed.counts).tolist()
+    ]
+    total = count_of(int(observed.counts.sum()), "change")
+    note(
+        f"--changes: {total} in {count_of(len(found), 'recording')}"
+        + (f": {', '.join(kinds)}" if kinds else "")
+    )
+    return observed
 
 
 def _posture(source: str, options: LearnOptions, note: Note) -> tuple[Floats, int]:
@@ -184,16 +196,24 @@ def _each(
 
 def adds_to_a_model(options: LearnOptions) -> bool:
     """Whether the walk is that of a model rather than learnt from recordings."""
-    return len(options.sources) == 1 and Path(options.sources[0]).suffix == MODEL
+    return len(options.sources) == 1 and is_model(options.sources[0])
 
 
-def _parsed(options: LearnOptions, first: str) -> dict[str, str]:
-    """Parse the names of the classes and their sources; `first`: name of the first class."""
-    wanted: dict[str, str] = {}
+def _parsed(options: LearnOptions, names: Sequence[str]) -> dict[str, str]:
+    """Parse the names of the classes and their sources; `names`: of the existing classes, the walk first."""
+    wanted, first = dict[str, str](), names[0]
+    if options.classes:
+        given = f"{options.sources[0]}: class" if adds_to_a_model(options) else "--activity"
+        _require_name(f"{given} {first!a}"[:MOST_SHOWN], first)
     for text in options.classes:
         name, _, source = text.partition("=")
+        _require_name(f"--class {text!a}"[:MOST_SHOWN], name)
         if not name or name in wanted or name == first:
             raise UsageError(f"--class {text}: give each class its own name, not {first}")
+        if like := [
+            other for other in (*names, *wanted) if other.casefold() == name.casefold() and other != name
+        ]:
+            raise UsageError(f"--class {text}: differs from the class {like[0]} only by case; rename it")
         if not source and (name not in (*DERIVED, RUN) or (name == RUN and adds_to_a_model(options))):
             raise UsageError(f"--class {text}: give recordings, --class {name}=FOLDER")
         wanted[name] = source
@@ -202,6 +222,15 @@ def _parsed(options: LearnOptions, first: str) -> dict[str, str]:
     if options.segments.source == "only":
         raise UsageError("--class: cannot be used with --segments only, which learns no cyclic model")
     return wanted
+
+
+def _require_name(given: str, name: str) -> None:
+    """Raise UsageError, about the words `given`, for a name that models or track files cannot have."""
+    if not name.isprintable() or set(name) & set(UNFIT):
+        words = "the name has a comma, quote, '=' or control character"
+        raise UsageError(f"{given}: {words}; use letters and digits")
+    if len(name.encode()) >= blob.NAME_BYTES:
+        raise UsageError(f"{given}: the name is longer than {blob.NAME_BYTES - 1} bytes; shorten it")
 
 
 def _derived(

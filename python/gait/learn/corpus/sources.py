@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
+from gait.bindings.model import SHIPPED, is_model
 from gait.errors import UserError, unreadable
 from gait.learn.solve.readers import SUFFIXES
 
@@ -35,11 +36,11 @@ def find(
                 raise UserError(f"{source}: no motion files ({_kinds()}) in this folder; name another folder")
             for path in inside:
                 found.setdefault(os.path.abspath(path), (path, True))
-        elif not source.is_file():
+        elif not source.is_file() and name not in SHIPPED:
             raise UserError(f"{source}: no such file or folder; check the name")
         elif source.suffix.lower() == ".asf":
             raise UserError(f"{source}: is a skeleton without motion; name the .amc files beside it")
-        elif source.suffix.lower() == ".gait":
+        elif is_model(name):
             raise UserError(
                 f"{source}: is a model, not a recording; to add to a model, name it as the only source, with "
                 "--class or --changes"
