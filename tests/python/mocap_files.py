@@ -1,11 +1,14 @@
-"""Small motion files for tests: a toy person in ASF/AMC, and any ASF/AMC written again as BVH."""
+"""Small motion files for tests: a toy person in ASF/AMC, any ASF/AMC written again as BVH, a stand."""
 
+import csv
 from pathlib import Path
 
 import gait_generator as g
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+import gait
+from gait.body.skeleton import JOINTS
 from gait.learn.mocap import acclaim
 from gait.learn.mocap.recording import Y_UP
 
@@ -144,6 +147,28 @@ def write_trials(folder, count):
         write_toy(folder, f"01_{i:02}", period=110.0 + 5 * i, seed=i, frames=300 + 20 * i)
     (folder / "01_02x.amc").write_text(BROKEN)
     return folder
+
+
+def write_stand(folder, name, model, elbow, walks=False, raised=0.0, stops=90):
+    """Write three seconds of joints of a person with bent elbows and raised arms, at 30 frames/s.
+
+    The person sways, or walks until the frame `stops`.
+    """
+    rng = np.random.default_rng(1)
+    folder.mkdir(exist_ok=True)
+    with (folder / f"{name}.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["frame", "time", *(f"{joint}_{axis}" for joint in JOINTS for axis in "xyz")])
+        order = [model.joint_names.index(joint) for joint in JOINTS]
+        for frame in range(90):
+            state = gait.State(stature=1.7, motion_class=0 if walks else 1, offset=np.zeros(24))
+            state.phase = min(frame, stops) / 33 % 1 if walks else 0
+            state.offset[[model.angle_names.index(f"{s}_elbow_flexion") for s in "lr"]] = elbow
+            state.offset[[model.angle_names.index(f"{s}_shoulder_abduction") for s in "lr"]] = raised
+            ahead = 1.4 * min(frame, stops) / 33 if walks else 0.004 * np.sin(frame / 10)
+            state.pelvis = np.array([ahead, 0.001 * rng.normal(), model.pelvis_height(state)])
+            places = model.pose(state)[0][order]
+            rows.writerow([frame, f"{frame / 30:.6f}", *(f"{x:.4f}" for x in places.ravel())])
 
 
 BROKEN = ":DEGREES\n1\nroot 1 2\n"

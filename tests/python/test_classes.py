@@ -17,7 +17,7 @@ import pytest
 import gait
 from gait.bindings.estimate import Estimate
 from gait.body.motion_classes import class_sections
-from gait.body.skeleton import JOINTS, points
+from gait.body.skeleton import points
 from gait.cli import main
 from gait.errors import GaitError, UserError
 from gait.io import blob, track_file
@@ -137,7 +137,7 @@ def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.
     assert main(["info", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "class stand: derived from the walk, stands still, 4 components" in printed
-    assert "class backwards: the curves of walk in reverse" in printed
+    assert "class backwards: derived: the curves of walk in reverse" in printed
     assert gait.Model(out).classes == ("walk", "stand", "backwards")
     assert feet_lifted(blob.read(out)) < 1e-5
     page = (tmp_path / "report" / "index.html").read_text()
@@ -213,29 +213,6 @@ def test_a_class_without_recordings_among_the_sources_is_an_error(
     error = capsys.readouterr().err
     assert "--class run: none of the recordings is a run (a.amc: " in error
     assert "give --class run=FOLDER, or leave it out" in error and not out.exists()
-
-
-def test_files_learnt_as_another_class_are_not_reported_as_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Runs when the walk is learnt, and walks when the run is."""
-    reported = {}
-    lines = (
-        "r.amc: not learnt as 'walk': this is running; leave it out, or give --activity run",
-        "w.amc: not learnt as 'run': this is not running; leave it out, or give --activity walk",
-        "bad.amc: cannot be read",
-    )
-
-    def learnt(options, note, complete=lambda sections: sections, elsewhere=lambda line: False):
-        reported[options.activity] = [line for line in lines if not elsewhere(line)]
-        blob.write(options.output, complete(blob.read(SHIPPED)))
-        return {"sequences": [{"source": f"{options.activity[0]}.amc"}]}
-
-    monkeypatch.setattr(class_run, "run", learnt)
-    options = LearnOptions(sources=("in",), output=str(tmp_path / "m.gait"), classes=("run",))
-    figures = class_run.learn(options, lambda line: None)
-    assert [one["name"] for one in figures["classes"]] == ["walk", "run"]
-    assert reported == {"run": [lines[0], lines[2]], "walk": [lines[1], lines[2]]}
 
 
 def test_what_belongs_elsewhere_is_neither_noted_nor_counted(
@@ -362,31 +339,13 @@ def test_a_model_contains_the_credits_of_all_its_classes(
     assert origin(LearnOptions(credit=("Lab C",)), [])["credits"] == ["Lab C"]
 
 
-def stand(folder: Path, name: str, model: gait.Model, elbow: float, walks: bool = False) -> None:
-    """Write three seconds of joints of a person with bent elbows who sways, or walks, at 30 frames/s."""
-    rng = np.random.default_rng(1)
-    folder.mkdir(exist_ok=True)
-    with (folder / f"{name}.csv").open("w", newline="") as file:
-        rows = csv.writer(file)
-        rows.writerow(["frame", "time", *(f"{joint}_{axis}" for joint in JOINTS for axis in "xyz")])
-        order = [model.joint_names.index(joint) for joint in JOINTS]
-        for frame in range(90):
-            state = gait.State(stature=1.7, motion_class=0 if walks else 1, offset=np.zeros(24))
-            state.phase = frame / 33 % 1 if walks else 0
-            state.offset[[model.angle_names.index(f"{s}_elbow_flexion") for s in "lr"]] = elbow
-            ahead = 1.4 * frame / 33 if walks else 0.004 * np.sin(frame / 10)
-            state.pelvis = np.array([ahead, 0.001 * rng.normal(), model.pelvis_height(state)])
-            places = model.pose(state)[0][order]
-            rows.writerow([frame, f"{frame / 30:.6f}", *(f"{x:.4f}" for x in places.ravel())])
-
-
 def test_standing_is_learnt_from_people_who_stand(
     model: gait.Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The mean of two people, one of them in two recordings; a recording of a walk is left out."""
     for name, elbow in (("anna_01", 1.0), ("anna_02", 1.0), ("ben_01", 0.4)):
-        stand(tmp_path / "in", name, model, elbow)
-    stand(tmp_path / "in", "carl_01", model, 0.0, walks=True)
+        mocap_files.write_stand(tmp_path / "in", name, model, elbow)
+    mocap_files.write_stand(tmp_path / "in", "carl_01", model, 0.0, walks=True)
     out, words = tmp_path / "m.gait", ["learn", str(SHIPPED), "-o", str(tmp_path / "m.gait")]
     assert main([*words, "--class", f"stand={tmp_path / 'in'}"]) == 0
     assert "carl_01.csv: not learnt as 'stand': the person does not stand still" in capsys.readouterr().err
@@ -399,8 +358,8 @@ def test_standing_is_learnt_from_people_who_stand(
     assert np.abs(change[legs]).max() < 4 and np.allclose(learnt[1:], derived[1:], atol=2e-3)
     assert gait.Model(out).class_info(1).direction == 0
     assert main(["info", str(out)]) == 0
-    assert "class stand: of 3 recordings of people who stand, stands still" in capsys.readouterr().out
-    stand(tmp_path / "walks", "carl_01", model, 0.0, walks=True)
+    assert "class stand: recorded: 3 recordings, stands still" in capsys.readouterr().out
+    mocap_files.write_stand(tmp_path / "walks", "carl_01", model, 0.0, walks=True)
     out.unlink()
     assert main([*words, "--class", f"stand={tmp_path / 'walks'}"]) == 1
     assert "none of the recordings can be used" in capsys.readouterr().err and not out.exists()

@@ -123,10 +123,10 @@ def _class_line(one: Mapping[str, Any]) -> str:
     from gait.learn.report.classes import words
 
     cells = words(one)
-    source = f"of {cells['from']}" if one["recordings"] and one["curves_of"] == one["name"] else cells["from"]
     moves = f"{cells['strides/s']} strides/s" if one["direction"] else cells["strides/s"]
+    components = count_of(int(cells["components"]), "component")
     return (
-        f"class {cells['class']}: {source}, {moves}, {count_of(int(cells['components']), 'component')}; "
+        f"class {cells['class']}: {cells['from']}, {moves}, {components}; "
         f"changes per second: {cells['changes per second']}"
     )
 

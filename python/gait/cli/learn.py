@@ -152,10 +152,11 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
         action="append",
         default=[],
         metavar="NAME[=SRC]",
-        help="add this motion class, so that gait track follows changes; may be repeated. stand and "
-        "backwards are derived from the walk, or learnt from the recordings in SRC: stand gets the mean "
-        "posture of people who stand still for a second; run is learnt from the runs among the sources, or "
-        "like any other NAME from the recordings in SRC. If SRC is a model (a .gait file, or classes, walk "
+        help="add this motion class, so that gait track follows changes; may be repeated. run, "
+        "backwards and stand are learnt from the runs, the walks backwards and the people who stand "
+        "throughout among the sources, or like any other NAME from the recordings in SRC; stand is their "
+        "mean posture, and SRC needs people who stand still for a second. Without any, backwards and stand "
+        "are derived from the walk. If SRC is a model (a .gait file, or classes, walk "
         "or paper of the package), its class of this name, or its only class, is copied. With a walking "
         "model as the only source, the classes are added to its own; they replace those of the same name",
     )

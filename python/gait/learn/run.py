@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -39,16 +39,18 @@ def run(
     note: Note = lambda line: None,
     complete: Callable[[Sections], Sections] = lambda sections: sections,
     elsewhere: Callable[[str], bool] = lambda line: False,
+    only: Collection[Path] = (),
 ) -> dict[str, Any]:
     """Learn a model, write it and its report, and return the figures of `report.summary`.
 
     `note` gets lines that a user should know.  `complete` adds to the sections of the model before they are
     written.  Lines about files left out are not reported if `elsewhere` is true for them: the files belong to
-    another class.  UsageError or UserError with one line if it cannot be done.
+    another class.  ``only``: files of the sources to learn from, if not all.  UsageError or UserError with
+    one line if it cannot be done.
     """
     check(options, note)
     with one_thread(), Corpus() as corpus:
-        loaded = _load(options, corpus, note, elsewhere)
+        loaded = _load(options, corpus, note, elsewhere, only)
         if options.segments.source == "only":
             return _segments_alone(options, corpus, loaded.refused)
         learned = fit.fit(loaded.sequences, options, loaded.others)
@@ -96,9 +98,16 @@ def check(options: LearnOptions, note: Note = lambda line: None) -> None:
         page.require_own(Path(report))
 
 
-def _load(options: LearnOptions, corpus: Corpus, note: Note, elsewhere: Callable[[str], bool]) -> load.Loaded:
+def _load(
+    options: LearnOptions,
+    corpus: Corpus,
+    note: Note,
+    elsewhere: Callable[[str], bool],
+    only: Collection[Path],
+) -> load.Loaded:
     """Find and prepare the files; report files that were left out, and the readers' observations."""
     files, closed = sources.find(options.sources, options.exclude, note)
+    files = [file for file in files if not only or file[0] in only]
     trials = {os.path.realpath(name) for name in options.static}
     files = [file for file in files if os.path.realpath(file[0]) not in trials]
     if not files:

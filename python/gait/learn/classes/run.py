@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
-from functools import reduce
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property, reduce
 from operator import add
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,8 +21,9 @@ from gait.io import blob
 from gait.learn.arrays import Floats, column_means
 from gait.learn.classes import changes, standing
 from gait.learn.classes.join import Change, MotionClass, classes_of, join
-from gait.learn.corpus.load import NothingLeft
+from gait.learn.corpus.load import NothingLeft, static_trials
 from gait.learn.corpus.sources import find, subjects
+from gait.learn.cycles.sequence import AS_BACKWARDS
 from gait.learn.cycles.verdict import NAMES
 from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.prior import model
@@ -32,7 +34,7 @@ from gait.learn.solve import readers
 from gait.progress import progress
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
-DERIVED = STAND, BACKWARDS  # made from the walk
+DERIVED = STAND, BACKWARDS  # made from the walk, without recordings
 UNFIT = ",\"'="  # for names of classes, which are in headers of track files
 MOST_SHOWN = 60  # most characters of an unfit name in an error
 T = TypeVar("T")
@@ -60,9 +62,10 @@ OTHER_CHANGE = Change(0.1)  # between a user's class and walking or standing
 def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     """Learn each of ``options.classes`` that has recordings, then the walk, and write one blob.
 
-    A class is ``stand`` or ``backwards``, derived from the walk; or ``NAME=SRC``, learnt from those
-    recordings (``backwards`` in reversed time, as a walk whose phase decreases; ``stand`` from people who
-    stand still) or taken from a model (`is_model`); or ``run``, learnt from the runs among the sources.  If
+    A class is ``run``, learnt from the runs among the sources; ``backwards`` or ``stand``, learnt from the
+    walks backwards or the people who stand throughout among the sources, or derived from the walk if there
+    are none; or ``NAME=SRC``, learnt from those recordings (``backwards`` in reversed time, as a walk whose
+    phase decreases; ``stand`` from people who stand still) or taken from a model (`is_model`).  If
     the only source is a model, the classes are added to its own, or replace those of their names.  Returns
     the figures of the walk, with those of the classes under ``classes``.  With ``options.changes``, changes
     between the classes are learnt from those recordings; without classes they are those of a model.
@@ -83,21 +86,24 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         )
     learnt, posture = dict[str, MotionClass](), None
     taken = {name for name, source in wanted.items() if is_model(source)}
-    used = set[str]()  # files among the sources that are learnt as another class
+    sorted_out = {name for name in DERIVED if wanted.get(name) == "" and own is None}
+    sorter = _Sorter(options, note, sorted_out)
     for name, source in wanted.items():
         if name in taken:
             learnt[name] = _taken(name, source)
         elif name == STAND:
-            posture = _posture(source, options, note) if source else None
+            posture = _mean_posture(_postures(source, options, note), options) if source else None
         elif source or name != BACKWARDS:
             learnt[name], files = _learnt(name, source, options, note)
-            used |= set() if source else files
+            sorter.runs |= set() if source else files
 
     def with_classes(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
+        learnt.update(sorter.backward_walks())
+        stands = posture or sorter.posture()
         classes = {one.name: one for one in classes_of(walk) or [_counted(MotionClass(first), walk)]}
         kept = classes.keys() - wanted.keys()
         for name in wanted:
-            classes[name] = learnt[name] if name in learnt else _derived(name, walk, first, posture)
+            classes[name] = learnt[name] if name in learnt else _derived(name, walk, first, stands)
         names = list(classes)
         if others := [name for name in names[1:] if name in kept]:
             note(f"{options.sources[0]}: keeps its classes {' '.join(others)}")
@@ -114,11 +120,67 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         data = blob.write(options.output, with_classes(own))
         figures: dict[str, Any] = {"bytes": len(data), "crc32": f"{blob.checksum(data):08x}"}
     else:
-        figures = run(
-            alone, note, with_classes, lambda line: any(line.startswith(f"{path}: ") for path in used)
-        )
+        figures = run(alone, note, with_classes, sorter.takes)
         data = Path(options.output).read_bytes()
     return figures | {"classes": class_figures(blob.decode(data))}
+
+
+@dataclass
+class _Sorter:
+    """Sorts recordings among the sources that are not learnt as the first class into other classes."""
+
+    options: LearnOptions
+    note: Note
+    names: Collection[str]  #: classes, of `DERIVED`, whose recordings to find
+    runs: set[str] = field(default_factory=set)  #: files that are learnt as runs
+    backwards: set[Path] = field(default_factory=set)
+    stands: dict[Path, Floats] = field(default_factory=dict)  #: postures
+
+    @cached_property
+    def files(self) -> list[Path]:
+        """Return the files of the sources."""
+        return [path for path, _ in find(self.options.sources, self.options.exclude)[0]]
+
+    def takes(self, line: str) -> bool:
+        """Whether a file that was left out, with this line about it, belongs to another class."""
+        path = next((path for path in self.files if line.startswith(f"{path}: ")), None)
+        if path is None or str(path) in self.runs:
+            return path is not None
+        if BACKWARDS in self.names and AS_BACKWARDS in line:
+            self.backwards.add(path)
+        elif STAND in self.names:
+            with suppress(UserError):
+                self.stands[path] = standing.posture_of(
+                    path, readers.read(path, self.options), throughout=True
+                )
+        return path in self.backwards or path in self.stands
+
+    def backward_walks(self) -> dict[str, MotionClass]:
+        """Learn the walks backwards; empty if there are none, or too few."""
+        if BACKWARDS not in self.names:
+            return {}
+        why = "none of the recordings is a walk backwards"
+        if self.backwards:
+            trials = zip(self.files, static_trials(self.files, self.options), strict=True)
+            own = {str(trial): None for path, trial in trials if trial and path in self.backwards}
+            options = replace(self.options, static=tuple(own))  # those of others would be unused
+            try:
+                learnt, files = _learnt(BACKWARDS, "", options, self.note, self.backwards)
+            except UserError as exc:
+                why = str(exc)
+            else:
+                self.note(f"--class {BACKWARDS}: recorded: {count_of(len(files), 'recording')}")
+                return {BACKWARDS: learnt}
+        self.note(f"--class {BACKWARDS}: derived, as the walk in reverse: {why}")
+        return {}
+
+    def posture(self) -> tuple[Floats, int] | None:
+        """Return the result of `_mean_posture` of people who stand; None if there are none."""
+        if STAND in self.names:
+            count = count_of(len(self.stands), "recording")
+            why = "derived from the walk: in none of the recordings a person stands still throughout"
+            self.note(f"--class {STAND}: " + (f"recorded: {count}" if self.stands else why))
+        return _mean_posture(self.stands, self.options) if self.stands else None
 
 
 def _level_curves(joined: Mapping[str, blob.Array], learnt: Sequence[int]) -> dict[str, blob.Array]:
@@ -159,13 +221,17 @@ def _observed(sections: Mapping[str, blob.Array], options: LearnOptions, note: N
     return observed
 
 
-def _posture(source: str, options: LearnOptions, note: Note) -> tuple[Floats, int]:
-    """Return the mean angles (24,) over people who stand in recordings, and the number of recordings."""
+def _postures(source: str, options: LearnOptions, note: Note) -> dict[Path, Floats]:
+    """Return the angles (24,) of the person who stands in each recording."""
 
     def angles(path: Path) -> Floats:
         return standing.posture_of(path, readers.read(path, options))
 
-    found = _each(f"--class {STAND}", (source,), angles, options, note)
+    return _each(f"--class {STAND}", (source,), angles, options, note)
+
+
+def _mean_posture(found: Mapping[Path, Floats], options: LearnOptions) -> tuple[Floats, int]:
+    """Return the mean angles (24,) over people, from postures by recording, and the number of recordings."""
     people: dict[str, list[Floats]] = {}
     for person, one in zip(subjects(list(found), options.subjects), found.values(), strict=True):
         people.setdefault(person, []).append(one)
@@ -236,7 +302,7 @@ def _require_name(given: str, name: str) -> None:
 def _derived(
     name: str, walk: Mapping[str, blob.Array], first: str, posture: tuple[Floats, int] | None
 ) -> MotionClass:
-    """Return a class derived from the first; `posture`: result of `_posture`, for standing."""
+    """Return a class derived from the first; `posture`: result of `_mean_posture`, for standing."""
     if name == BACKWARDS:
         return MotionClass(BACKWARDS, -1, source=first)
     angles, recordings = posture or (None, 0)
@@ -263,8 +329,14 @@ def _taken(name: str, source: str) -> MotionClass:
     return _counted(MotionClass(name, own=own), own)
 
 
-def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> tuple[MotionClass, set[str]]:
-    """Learn a class from recordings; return also the files that were used."""
+def _learnt(
+    name: str, source: str, options: LearnOptions, note: Note, only: Collection[Path] = ()
+) -> tuple[MotionClass, set[str]]:
+    """Learn a class from recordings; return also the files that were used.
+
+    Without a source, they are among the sources of the first class: those of `only`, or those that are
+    accepted.
+    """
 
     def of_the_first(line: str) -> bool:
         return not source and line.endswith(f"give --activity {options.activity}")
@@ -282,9 +354,9 @@ def _learnt(name: str, source: str, options: LearnOptions, note: Note) -> tuple[
             several=True,
         )
         try:
-            figures = run(own, lambda line: note(f"class {name}: {line}"), elsewhere=of_the_first)
+            figures = run(own, lambda line: note(f"class {name}: {line}"), elsewhere=of_the_first, only=only)
         except NothingLeft as exc:
-            if source:
+            if source or only:
                 raise
             remedy = f"give --class {name}=FOLDER, or leave it out"
             raise UserError(f"--class {name}: none of the recordings is a {name} ({exc}); {remedy}") from None

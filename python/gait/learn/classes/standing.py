@@ -37,6 +37,7 @@ STANDING_COMPONENTS: tuple[dict[str, float], ...] = (
 STILL_S = 1.0  # seconds for which a person must stand still; feet of people who walk slowly rest for 0.4 s
 STILL_M = 0.03  # metres; most that pelvis and ankles move in them
 BENT_KNEES = np.radians(40.0)  # from which a person sits or crouches
+RAISED_ARMS = np.radians(40.0)  # of an upper arm from the vertical, from which a pose is one of calibration
 #: Standard deviations of posture, degrees: arms may hang, fold, point or carry.
 STANDING_POSTURE_SD_DEG = {"shoulder_flexion": 25.0, "shoulder_abduction": 12.0, "shoulder_rotation": 20.0,
            "elbow_flexion": 35.0, "torso_y": 6.0, "torso_x": 4.0, "torso_z": 8.0}  # fmt: skip
@@ -49,17 +50,21 @@ def body_of(path: Path, read: Body | AngleTable) -> Body:
     return retarget.levelled(read)
 
 
-def posture_of(path: Path, read: Body | AngleTable) -> Floats:
+def posture_of(path: Path, read: Body | AngleTable, throughout: bool = False) -> Floats:
     """Return the mean angles (24,), radians, of a person while standing still; NaN where nothing shows them.
 
-    UserError if the person does not stand still for `STILL_S`.
+    UserError if the person does not stand still for `STILL_S`; with `throughout`, if the person ever moves,
+    or holds the arms as for calibration.
     """
     body = body_of(path, read)
     still = _still(body)
-    if not still.any():
+    if not still.any() or (throughout and not still.all()):
+        how_long = "throughout" if throughout else f"for {STILL_S:g} s"
         raise UserError(
-            f"{path}: not learnt as 'stand': the person does not stand still for {STILL_S:g} s; leave it out"
+            f"{path}: not learnt as 'stand': the person does not stand still {how_long}; leave it out"
         )
+    if throughout and _raises_an_arm(body):
+        raise UserError(f"{path}: not learnt as 'stand': an arm is raised; leave it out")
     posture = column_means(retarget.observed_angles(body, retarget.measure(body))[still])
     knees = posture[[ANGLES.index(f"{s}_knee_flexion") for s in SIDES]]
     if (knees > BENT_KNEES).any():
@@ -69,6 +74,13 @@ def posture_of(path: Path, read: Body | AngleTable) -> Floats:
             "leave it out"
         )
     return posture
+
+
+def _raises_an_arm(body: Body) -> bool:
+    """Whether an upper arm is raised on average; False if no arm is visible."""
+    arms = [body.joints[f"{s}_elbow"] - body.joints[f"{s}_shoulder"] for s in SIDES]
+    down = np.array([-arm[:, 2] / np.linalg.norm(arm, axis=1) for arm in arms])
+    return bool((column_means(down.T) < np.cos(RAISED_ARMS)).any())
 
 
 def _still(body: Body) -> npt.NDArray[np.bool_]:

@@ -18,6 +18,8 @@ from gait.learn.solve import readers, retarget
 from gait.learn.solve.body import Body
 
 YAW = ROOTS.index("root_yaw")
+#: Remedy for a walk backwards, by which `gait.learn.classes.run` sorts it out.
+AS_BACKWARDS = "--class backwards=FOLDER"
 OBSERVED_PHASES = 64  # phases at which the observed share of a cycle is counted
 
 
@@ -123,7 +125,7 @@ def _long(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequenc
     if not judged.accepted:
         remedy = "--activity " + judged.activity if {judged.activity, wanted} == {"walk", "run"} else ""
         if judged.backwards and verdict.NAMES.get(wanted.lower()) == "walk":
-            remedy = "--class backwards=FOLDER"
+            remedy = AS_BACKWARDS
         raise _refused(path, wanted, judged.reason, remedy)
     if not cutting.fewest_cycles(channels, found.frames, OBSERVED_PHASES):
         raise _refused(path, wanted, "too little of each cycle is observed")

@@ -37,12 +37,11 @@ def figures(sections: Mapping[str, blob.Array]) -> list[dict[str, Any]]:
 def words(one: Mapping[str, Any]) -> dict[str, str]:
     """Describe a class of `figures`, by column of a table."""
     source = "derived from the walk"
-    if one["cycles"]:
-        source = f"{one['cycles']} cycles"
-    elif one["recordings"]:
-        source = f"{count_of(one['recordings'], 'recording')} of people who stand"
+    if one["cycles"] or one["recordings"]:
+        cycles = f", {one['cycles']} cycles" if one["cycles"] else ""
+        source = f"recorded: {count_of(one['recordings'], 'recording')}{cycles}"
     if one["curves_of"] != one["name"]:
-        source = f"the curves of {one['curves_of']} in reverse"
+        source = f"derived: the curves of {one['curves_of']} in reverse"
     moves = one["direction"] != 0
     return {
         "class": one["name"],
