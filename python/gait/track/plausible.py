@@ -16,7 +16,8 @@ from gait.track.person_shapes import PersonShapes
 
 _DEPARTURE = 0.6  # metres in one second by which the pelvis may depart from the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
-_TURNED_S = 0.25  # of the last second, in which keypoints show the trunk facing the other way
+_TURNED_S = 0.5  # of the last second, in which keypoints show the trunk facing the other way
+_NOT_TURNED_S = 0.25  # of it, up to which they no longer do
 _FRAME_S = 0.1  # for which one frame of them counts at most
 _LEAST_SD = 0.05  # metres; least standard deviation of a stature
 _ELSEWHERE = "the person detected in the image does not match"
@@ -56,10 +57,12 @@ class Plausibility:
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
         self.directions, self._travel = directions, 1.0 - belt
         self._second: deque[tuple[float, ...]] = deque()  # times, places, velocities, seconds turned
+        self._turned = False
 
     def restart(self) -> None:
         """Forget the last second, since the track starts again elsewhere."""
         self._second.clear()
+        self._turned = False
         self._keypoints.restart()
 
     def judged(self, frame: Frame, estimate: Estimate) -> Estimate:
@@ -72,8 +75,9 @@ class Plausibility:
         walks = self._walks(estimate)
         agree = self._keypoints.agree(frame, estimate)
         supported = not estimate.flags & Flag.UNSUPPORTED
-        turned = sum(row[-1] for row in self._second) > _TURNED_S
-        if turned and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
+        bound = _NOT_TURNED_S if self._turned else _TURNED_S
+        self._turned = sum(row[-1] for row in self._second) > bound
+        if self._turned and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
             return replace(estimate, status=TrackStatus.AMBIGUOUS, reason=_TURNED)
         if estimate.status == TrackStatus.AMBIGUOUS and estimate.flags & Flag.OTHERS_FIT:
             return replace(estimate, reason=_OTHERS_FIT)
