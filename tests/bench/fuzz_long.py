@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import fcntl
 import hashlib
 import re
 import resource
@@ -128,15 +129,17 @@ def main() -> int:
     for name in args.only or sorted(folder.name for folder in CORPUS.iterdir()):
         run = fuzz(name, args.runs, args.seed, args.seconds)
         faults += run[HEAD.index("faults") - 1]
-        if args.record or args.add:
-            rows = recorded()  # with those of runs that ended meanwhile
-        rows[name] = together(name, run, rows.get(name) if args.add else None)
         if args.keep:
             keep(name)
-        if args.record or args.add:
-            table.publish("fuzz", title, HEAD, [rows[each] for each in sorted(rows)], note)
-        else:
+        if not (args.record or args.add):
+            rows[name] = together(name, run, None)
             print(*rows[name], flush=True)
+            continue
+        with Path(__file__).open() as own:
+            fcntl.flock(own, fcntl.LOCK_EX)  # runs that end together wait for each other
+            rows = recorded()  # with those of runs that ended meanwhile
+            rows[name] = together(name, run, rows.get(name) if args.add else None)
+            table.publish("fuzz", title, HEAD, [rows[each] for each in sorted(rows)], note)
     if not (args.record or args.add):
         table.show(title, HEAD, rows.values())
     return int(faults > 0)
