@@ -152,7 +152,7 @@ def find_starts(
                 walks = fit.solve(round(1e6 * middle))
             except GaitError:
                 continue
-            walk = next((one for one in walks if one.mean.motion_class == 0), None)  # all else has that class
+            walk = next((one for one in walks if one.mean.motion_class == 0), None)  # as of the fit
             if walk is None:
                 continue
             if best is None or walk.chi2_per_observation < best.walk.chi2_per_observation:
