@@ -15,6 +15,8 @@ from eval_table import MEDIAPIPE
 Rows = list[dict[str, Any]]
 TOWARD = "toward300"
 AUTO = "default/auto"
+ROOT, ROOT_WORST, ABSOLUTE = 25, 40, 45  # mm
+BELOW_FREE = 0.4  # of the error of the mean cycle that runs freely
 STARTS = {AUTO: "auto", "default/images": "without the detector"}
 
 
@@ -71,24 +73,40 @@ def _nothing(measure: str, wanted: str, how: str) -> Verdict:
 
 
 def _root(rows: Rows) -> Verdict:
-    measure, wanted = "root-aligned median per clip, mm", "median over clips <= 45, none above 65"
+    measure, wanted = (
+        "root-aligned median per clip, mm",
+        f"median over clips <= {ROOT}, none above {ROOT_WORST}",
+    )
     clips = per_clip(_of(rows, BASE), "root_mm")
     if not clips:
         return _nothing(measure, wanted, "--modes default --init truth")
     middle, worst = np.median(list(clips.values())), max(clips, key=lambda c: clips[c])
     reached = f"{middle:.1f}; worst {worst} {clips[worst]:.1f}"
-    return Verdict(measure, wanted, reached, bool(middle <= 45 and clips[worst] <= 65))
+    return Verdict(measure, wanted, reached, bool(middle <= ROOT and clips[worst] <= ROOT_WORST))
 
 
 def _abs(rows: Rows) -> Verdict:
-    measure, wanted = "absolute median per clip, mm", "median over clips <= 60, toward300 <= 150"
+    measure, wanted = "absolute median per clip, mm", f"median over clips <= {ABSOLUTE}, toward300 <= 150"
     clips = per_clip(_of(rows, BASE), "abs_mm")
     if not clips:
         return _nothing(measure, wanted, "--modes default --init truth")
     middle = np.median(list(clips.values()))
     toward = [value for clip, value in clips.items() if clip.startswith(TOWARD)]
     reached = f"{middle:.0f}" + "".join(f"; {TOWARD} {value:.0f}" for value in toward)
-    return Verdict(measure, wanted, reached, bool(middle <= 60 and all(v <= 150 for v in toward)))
+    return Verdict(measure, wanted, reached, bool(middle <= ABSOLUTE and all(v <= 150 for v in toward)))
+
+
+def _free(rows: Rows) -> Verdict:
+    measure = "root-aligned error below that of the mean cycle that runs freely"
+    wanted = f">= {100 * BELOW_FREE:.0f} % on every clip"
+    runs = _of(rows, BASE)
+    clips, free = per_clip(runs, "root_mm"), per_clip([r for r in runs if not r["failure"]], "free_mm")
+    if not clips:
+        return _nothing(measure, wanted, "--modes default --init truth")
+    below = {clip: 1 - value / free.get(clip, 1) for clip, value in clips.items()}
+    worst = min(below, key=lambda clip: below[clip])
+    reached = f"{100 * below[worst]:.0f} to {100 * max(below.values()):.0f} %; worst {worst}"
+    return Verdict(measure, wanted, reached, below[worst] >= BELOW_FREE)
 
 
 def _stature(rows: Rows) -> Verdict:
@@ -240,7 +258,7 @@ def _dev(rows: Rows) -> Rows:
 
 
 _CHECKS: list[Callable[[Rows], Verdict]] = [
-    *(_root, _abs, _stature, _lost, _phase),
+    *(_root, _abs, _free, _stature, _lost, _phase),
     *(partial(check, arm=arm) for arm in STARTS for check in (_locked, _side)),
     *(_coverage, _no_plate, _outdoor, _events, _slower, _mediapipe),
 ]

@@ -32,7 +32,15 @@ PHASE = (FIRST_PHASE + RATE * TRUTH.frame / 30) % 1
 def row(clip, seed=1, arm=eval_plan.BASE, **values):
     """Figures of a good run, changed by `values`."""
     good = {
-        **{"root_mm": 40.0, "abs_mm": 50.0, "px": 3.0, "any_px": 3.0, "lost_pct": 0.0, "lost2_pct": 0.0},
+        **{
+            "root_mm": 20.0,
+            "free_mm": 50.0,
+            "abs_mm": 40.0,
+            "px": 3.0,
+            "any_px": 3.0,
+            "lost_pct": 0.0,
+            "lost2_pct": 0.0,
+        },
         **{"phase_pct": 1.0, "flips_pct": 0.0, "cover90": 0.9, "root12_mm": 45.0, "crps_mm": 20.0},
         **{
             "lost_run": False,
@@ -119,11 +127,12 @@ def test_every_wanted_line_passes_on_good_runs_and_fails_on_bad_ones():
     clips = ("a", "b", "toward300_08", "outdoor")
     arms = (eval_plan.BASE, *eval_wanted.STARTS, "stature +5 %", "background none", "every 2", "every 3")
     good = [row(clip, seed, arm) for arm in arms for clip in clips for seed in (1, 2, 3)]
-    assert [v.passed for v in eval_wanted.verdicts(good)][:-1] == [True] * 14
+    assert [v.passed for v in eval_wanted.verdicts(good)][:-1] == [True] * 15
     assert eval_wanted.missed(good) == []
     bad = {
-        "root-aligned": {"root_mm": 66.0},
-        "absolute": {"abs_mm": 151.0},
+        "root-aligned median": {"root_mm": 41.0},
+        "absolute": {"abs_mm": 46.0},
+        "runs freely": {"free_mm": 33.0},
         "wrong stature": {"px": 4.0, "arm": "stature +5 %"},
         "lost frames": {"lost2_pct": 30.0},
         "phase error": {"flips_pct": 1.0},
@@ -152,7 +161,8 @@ def test_what_was_not_run_is_neither_passed_nor_failed():
 
 def test_a_run_that_gave_up_is_not_left_out():
     rows = [row("a", seed, failure="no", root_mm=None, lost_run=True) for seed in (1, 2)] + [row("a", 3)]
-    assert verdict(rows, "root-aligned").passed is False
+    assert verdict(rows, "root-aligned median").passed is False
+    assert verdict(rows, "runs freely").passed is False
     assert "2 of 3" in verdict(rows, "lost frames").reached
 
 
