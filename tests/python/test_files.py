@@ -16,7 +16,7 @@ from test_trackfile import write as write_track
 
 from gait.errors import UserError
 from gait.io import blob
-from gait.io.files import filling, replacing, require_file, require_folder, require_writable
+from gait.io.files import filling, making, replacing, require_file, require_folder, require_writable
 from gait.lcm.link import LogWriter
 
 
@@ -126,7 +126,7 @@ def test_a_folder_is_filled_whole_or_not_at_all(tmp_path):
     with pytest.raises(KeyboardInterrupt), filling(path) as folder:
         (folder / "half.png").write_text("half")
         raise KeyboardInterrupt
-    assert not [p for p in tmp_path.rglob("*") if p.is_file()] and not path.exists()
+    assert not list(tmp_path.iterdir())
     for text in ("new", "again"):
         with filling(path) as folder:
             (folder / "report.html").write_text(text)
@@ -138,6 +138,18 @@ def test_a_folder_is_filled_whole_or_not_at_all(tmp_path):
     with filling(path) as folder:
         (folder / "a.png").write_text("keeps its mode")
     assert (path / "a.png").stat().st_mode & 0o777 == 0o640
+
+
+def test_folders_of_a_command_that_fails_go_unless_there_is_something_in_them(tmp_path):
+    for name, left in (("", []), ("a.csv", ["new", "new/a.csv"])):
+        with pytest.raises(KeyboardInterrupt), making(tmp_path / "new" / "deep"):
+            if name:
+                (tmp_path / "new" / name).write_text("of another")
+            raise KeyboardInterrupt
+        assert sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*")) == left
+    with pytest.raises(KeyboardInterrupt), making(tmp_path):
+        raise KeyboardInterrupt
+    assert tmp_path.is_dir()
 
 
 def test_a_folder_for_which_there_is_no_space_is_named(tmp_path):
@@ -375,7 +387,7 @@ def test_leftovers_that_are_not_ours_or_cannot_be_renamed_stay(tmp_path, monkeyp
         other.setattr("os.geteuid", lambda: os.getuid() + 1)
         write("of another user")
     with monkeypatch.context() as sticky:
-        sticky.setattr("gait.io.files._keep", refuse)
+        sticky.setattr("gait.io.files.keep_unfinished", refuse)
         write("in a folder in which only the owner may rename")
     with monkeypatch.context() as hidden:
         hidden.setattr("os.listdir", refuse)

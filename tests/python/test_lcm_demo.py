@@ -4,6 +4,7 @@ import fcntl
 import os
 import signal
 import subprocess
+import time
 
 import lcm_rig as rig
 import pytest
@@ -84,12 +85,35 @@ def test_a_demo_whose_tracker_fails_reports_it_and_ends(folder, tmp_path):
     rig.need_multicast()
     out = tmp_path / "out"
     out.mkdir()
-    for name in ("track.csv", "overlay.mp4", "report.html"):
+    for name in ("track.csv", "overlay.mp4", "report.html", "estimates.log"):
         (out / name).write_text("of an older run")
-    words = ["--video", folder / "video.mp4", "--trackd", "/bin/false", "-o", out]
-    done = rig.gait("demo", *words)
-    assert done.returncode == 1 and "gait-trackd: ended too early" in done.stderr, done.stderr
-    assert not leftovers(out) and not list(out.iterdir())
+    for to in (out, tmp_path / "new" / "out"):
+        done = rig.gait("demo", "--video", folder / "video.mp4", "--trackd", "/bin/false", "-o", to)
+        assert done.returncode == 1 and "gait-trackd: ended too early" in done.stderr, done.stderr
+        assert not leftovers(to)
+    assert list(tmp_path.iterdir()) == [out] and not list(out.iterdir())
+
+
+def test_what_was_recorded_until_the_tracker_died_is_unfinished(long_video, tmp_path):
+    rig.need_multicast()
+    out, tracker, number = tmp_path / "out", tmp_path / "tracker", tmp_path / "number"
+    tracker.write_text(f'#!/bin/sh\necho $$ > {number}\nexec {rig.TRACKD} "$@"\n')
+    tracker.chmod(0o755)
+    command = [str(rig.PYTHON), "-m", "gait", "demo", "--video", str(long_video), "-o", str(out)]
+    process = subprocess.Popen([*command, "--trackd", str(tracker)], stderr=subprocess.PIPE, text=True)
+    try:
+        end = time.monotonic() + rig.PATIENCE
+        while not list(out.glob(".track.*.csv")) and time.monotonic() < end and process.poll() is None:
+            time.sleep(0.02)
+        os.kill(int(number.read_text()), signal.SIGKILL)
+        _, words = process.communicate(timeout=rig.PATIENCE)
+    finally:
+        process.kill()
+        process.communicate()
+    assert process.returncode == 1 and "gait-trackd: ended too early" in words
+    assert {p.name for p in out.iterdir()} == {"track.unfinished.csv", "estimates.unfinished.log"}
+    assert "track.csv: not finished; what was written is in track.unfinished.csv" in words
+    assert not leftovers(out)
 
 
 def test_the_demo_hands_the_daemon_the_file_of_a_shipped_model(tmp_path):

@@ -67,7 +67,7 @@ def replacing(
     except BaseException as error:
         is_there = temporary.exists()  # neither if creating it failed nor after it got its name
         if is_there and partial is not None and _ends_early(error) and partial(temporary):
-            _keep(temporary, target, "not finished; what was written")
+            keep_unfinished(temporary, target)
         if not isinstance(error, OSError):
             raise
         if error.errno not in WRITE_ERRORS and error.filename != str(temporary):
@@ -135,7 +135,7 @@ def recover(folder: Path, stem: str, suffix: str, cut: Callable[[Path], bool] | 
             if left.stat().st_size == 0 or (cut is not None and not cut(left)):
                 left.unlink()
             else:
-                _keep(left, target, "the command that wrote it was killed; what it wrote")
+                keep_unfinished(left, target, "the command that wrote it was killed; what it wrote")
 
 
 def end_at_a_row(table: Path) -> bool:
@@ -154,7 +154,7 @@ def is_unfinished(path: str | os.PathLike[str]) -> bool:
     return re.search(r"\.unfinished(-\d+)?$", Path(path).stem) is not None
 
 
-def _keep(left: Path, target: Path, what: str) -> None:
+def keep_unfinished(left: Path, target: Path, what: str = "not finished; what was written") -> None:
     """Rename an unfinished `target` to NAME.unfinished.SUFFIX, or -2, -3 ... if that exists; report it."""
     names = (f"{target.stem}.unfinished{number}{target.suffix}" for number in ("", *range(-2, -1000, -1)))
     kept = next(path for path in map(target.with_name, names) if not path.exists())
@@ -256,6 +256,25 @@ def require_unread(path: str, inputs: Sequence[str | None]) -> None:
 
 
 @contextmanager
+def making(folder: Path) -> Iterator[None]:
+    """Make a folder and those above it; if the block fails, remove those that it made and that are empty."""
+    new = _absent(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):  # if it is not empty
+            for made in new:
+                made.rmdir()
+        raise
+
+
+def _absent(folder: Path) -> list[Path]:
+    """Return those of a folder and the folders above it that do not exist, lowest first."""
+    return [path for path in (folder, *folder.parents) if not path.exists()]
+
+
+@contextmanager
 def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield an empty folder; if the block succeeds, move its files to the folder `path`, pages (.html) last.
 
@@ -274,10 +293,9 @@ def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def _filling(folder: Path) -> Iterator[Path]:
-    new = [p for p in (folder, *folder.parents) if not p.exists()]
+    new = _absent(folder)
     beside = folder if folder.is_dir() else folder.parent
-    beside.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=beside) as name:
+    with making(beside), tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=beside) as name:
         yield Path(name)
         folder.mkdir(exist_ok=True)
         for made in new:

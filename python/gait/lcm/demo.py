@@ -21,7 +21,7 @@ from gait.bindings.model import Model, model_file
 from gait.camera.camera import Camera
 from gait.errors import UsageError, UserError
 from gait.io.fields import read_json
-from gait.io.files import require_folder
+from gait.io.files import keep_unfinished, making, require_folder
 from gait.io.track_file import read_truth
 from gait.io.video import Video, read_plate
 from gait.lcm.link import ROUTE_REMEDY, multicast_works, private_url, receive_buffer
@@ -151,6 +151,7 @@ def _end(process: subprocess.Popen[str], deadline: float) -> None:
 
 
 RESULTS = ("track.csv", "overlay.mp4", "report.html")
+_RECORDED = ("track.csv", "estimates.log")
 _READY = 60.0  # seconds that the tracker has to confirm camera and start
 _LARGE_FRAME_BYTES = 1 << 21  # bytes of a colour frame above which receivers cannot keep up
 _IDLE_S = 2.0  # seconds without an estimate after which the recording ends
@@ -215,17 +216,11 @@ class Demo:
             raise UserError(f"{self.trackd}: no such program; run make tools, or give --trackd")
         self._check_inputs()
         require_folder(self.output)
-        self.output.mkdir(parents=True, exist_ok=True)
         live = multicast_works()
-        with _alone(self.output), Session() as session:
-            for name in RESULTS:
+        with making(self.output), _alone(self.output):
+            for name in (*RESULTS, *_RECORDED):
                 (self.output / name).unlink(missing_ok=True)  # not to be mistaken for this run
-            clip = self._with_clip(session)
-            if live:
-                recording = clip._run_live(session)
-            else:
-                note(f"gait demo: no latency will be measured: {ROUTE_REMEDY}; using a log file")
-                recording = clip._run_through_log(session)
+            clip, recording = self._recorded(live)
             assert clip.video is not None and clip.camera is not None
             files = RunFiles(
                 track=str(self.output / "track.csv"),
@@ -239,6 +234,21 @@ class Demo:
             )
             _, measures = write_report(str(self.output / "estimates.log"), files, live=live)
         return recording, measures
+
+    def _recorded(self, live: bool) -> tuple[Demo, dict[str, Any]]:
+        """Run the processes; return this demo with its clip's files, and the figures of the recording."""
+        try:
+            with Session() as session:
+                clip = self._with_clip(session)
+                if live:
+                    return clip, clip._run_live(session)
+                note(f"gait demo: no latency will be measured: {ROUTE_REMEDY}; using a log file")
+                return clip, clip._run_through_log(session)
+        except BaseException:
+            for file in (self.output / name for name in _RECORDED):
+                if file.exists():
+                    keep_unfinished(file, file)
+            raise
 
     def _check_inputs(self) -> None:
         """Read the user's files, so that faults are reported before anything is rendered or started."""

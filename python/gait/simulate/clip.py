@@ -6,7 +6,7 @@ import csv
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,7 @@ import numpy as np
 from gait._version import __version__
 from gait.bindings.initial import DEFAULT_SD
 from gait.camera.path import CameraPose, write_path
-from gait.errors import UserError
-from gait.io.files import replacing, require_writable
+from gait.io.files import making, replacing, require_folder, require_writable
 from gait.io.video import VideoWriter, write_picture
 from gait.motion.footfalls import Strikes
 from gait.simulate.body import BONE_INDEX, SIDES
@@ -355,25 +354,14 @@ def simulate(
 def _folder(folder: str | os.PathLike[str], names: Iterable[str]) -> Iterator[Path]:
     """Create the folder, and check before the work that every file can be written there.
 
-    A folder that did not exist is removed if the block fails before anything is written.
+    Folders that did not exist are removed if the block fails before anything is written.
     """
     target = Path(folder)
-    new = not target.exists()
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError):
-        raise UserError(f"{target}: is a file; give the name of a folder") from None
-    except OSError as exc:
-        raise UserError(f"{target}: cannot be created ({exc.strerror}); choose another place") from None
-    try:
+    require_folder(target)
+    with making(target):
         for name in names:
             require_writable(target / name)
         yield target
-    except BaseException:
-        if new:
-            with suppress(OSError):  # if it is not empty
-                target.rmdir()
-        raise
 
 
 def _write_video(
