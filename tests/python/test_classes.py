@@ -209,6 +209,7 @@ def test_a_class_without_recordings_among_the_sources_is_an_error(
 
     monkeypatch.setattr(class_run, "run", no_runs)
     out = tmp_path / "m.gait"
+    (tmp_path / "a.amc").touch()
     assert main(["learn", str(tmp_path), "-o", str(out), "--class", "run"]) == 1
     error = capsys.readouterr().err
     assert "--class run: none of the recordings is a run (a.amc: " in error
@@ -400,6 +401,33 @@ def test_bad_classes_are_one_line(
     assert main(["learn", "nowhere", "-o", str(tmp_path / "m.gait"), *options]) == 2
     error = capsys.readouterr().err
     assert words in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ([f"--class={name}={CLASSES}" for name in "abcdefg"], "--class: with walk these are 9 classes"),
+        (["--class", "trot=nowhere"], "--class trot: nowhere: no such file or folder"),
+        (["--class", f"trot={CLASSES}"], f"--class trot={CLASSES}: has no class trot"),
+        (["--changes", "nowhere"], "nowhere: no such file or folder"),
+        (["-o", "nowhere/m.gait"], "nowhere/m.gait: folder "),
+    ],
+)
+def test_classes_are_checked_before_any_recording_is_read(
+    more: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """As they are in a run whose only recording cannot be read."""
+    monkeypatch.chdir(tmp_path)
+    Path("limp.amc").write_text(mocap_files.BROKEN)
+    for source in (str(SHIPPED), "limp.amc"):
+        assert main(["learn", source, "-o", "m.gait", "--class", "limp=limp.amc", *more]) in (1, 2)
+        error = capsys.readouterr().err
+        assert error.startswith(f"gait learn: {words}") and error.count("\n") == 1
+        assert [path.name for path in tmp_path.iterdir()] == ["limp.amc"]
 
 
 @pytest.mark.parametrize("name", ["x" * 80, "a=b"])

@@ -13,11 +13,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from gait.bindings.abi import MAX_CLASSES
 from gait.bindings.model import is_model, read_cyclic
 from gait.body.motion_classes import CLASS_TAGS, class_names, class_sections, first_class
 from gait.counts import count_of
 from gait.errors import UsageError, UserError
 from gait.io import blob
+from gait.io.files import require_writable
 from gait.learn.arrays import Floats, column_means
 from gait.learn.classes import changes, standing
 from gait.learn.classes.join import Change, MotionClass, classes_of, join
@@ -77,6 +79,9 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
     wanted, alone = _parsed(options, names), replace(options, classes=(), several=True)
     if options.changes and not wanted:
         return _only_changes(own, options, note)
+    _require(wanted, options)
+    learnt = {name: _taken(name, source) for name, source in wanted.items() if is_model(source)}
+    taken, posture = set(learnt), None
     if own is None:
         check(alone)
     elif not class_names(own):
@@ -84,14 +89,12 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
             f"{options.sources[0]}: was learnt alone, so its strides are as long at every rate, and slow "
             "walks are followed worse; learn it again from its recordings, together with the classes"
         )
-    learnt, posture = dict[str, MotionClass](), None
-    taken = {name for name, source in wanted.items() if is_model(source)}
     sorted_out = {name for name in DERIVED if wanted.get(name) == "" and own is None}
     sorter = _Sorter(options, note, sorted_out)
     for name, source in wanted.items():
         if name in taken:
-            learnt[name] = _taken(name, source)
-        elif name == STAND:
+            continue
+        if name == STAND:
             posture = _mean_posture(_postures(source, options, note), options) if source else None
         elif source or name != BACKWARDS:
             learnt[name], files = _learnt(name, source, options, note)
@@ -283,11 +286,28 @@ def _parsed(options: LearnOptions, names: Sequence[str]) -> dict[str, str]:
         if not source and (name not in (*DERIVED, RUN) or (name == RUN and adds_to_a_model(options))):
             raise UsageError(f"--class {text}: give recordings, --class {name}=FOLDER")
         wanted[name] = source
+    if (count := len({*names, *wanted})) > MAX_CLASSES:
+        most = f"a model has at most {MAX_CLASSES}; leave some out"
+        raise UsageError(f"--class: with {' '.join(names)} these are {count} classes, but {most}")
     if options.report and adds_to_a_model(options):
         raise UsageError("--report: draws what is learnt from recordings; leave it out, see gait info")
     if options.segments.source == "only":
         raise UsageError("--class: cannot be used with --segments only, which learns no cyclic model")
     return wanted
+
+
+def _require(wanted: Mapping[str, str], options: LearnOptions) -> None:
+    """Raise UserError, before any recording is read, if sources or the model's folder do not exist."""
+    require_writable(options.output)
+    recordings = () if adds_to_a_model(options) else options.sources
+    for sources in filter(None, (recordings, options.changes)):
+        find(sources, options.exclude)
+    for name, source in wanted.items():
+        try:
+            if source and not is_model(source):
+                find([source], options.exclude)
+        except UserError as exc:
+            raise UserError(f"--class {name}: {exc}") from None
 
 
 def _require_name(given: str, name: str) -> None:
