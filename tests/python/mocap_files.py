@@ -59,10 +59,15 @@ def toy_asf():
     return "\n".join([*lines, "  end"]) + "\n"
 
 
-def toy_amc(frames=300, period=120.0, offset=10.0, speed=1.3, swing=1.0, seed=0):
-    """Text of a straight walk at 120 frames/s, angles like the normative ones times `swing`."""
+def toy_amc(frames=300, period=120.0, offset=10.0, speed=1.3, swing=1.0, seed=0, together=False):
+    """Text of a straight walk at 120 frames/s, angles like the normative ones times `swing`.
+
+    `together`: the left leg and arm move with the right ones.
+    """
     phase = (np.arange(frames) - offset) / period
     curve = swing * g.mean_curves(phase) + np.random.default_rng(seed).normal(scale=0.1, size=(frames, 19))
+    if together:
+        curve[:, 11:] = curve[:, 3:11]
     unit = acclaim.INCH / 0.45
     lines = [":FULLY-SPECIFIED", ":DEGREES"]
     for t in range(frames):

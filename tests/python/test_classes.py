@@ -248,6 +248,24 @@ def test_recorded_backward_walks_are_learnt_in_reversed_time(tmp_path: Path) -> 
     assert np.degrees(np.abs(sections["CUR1"][0] - sections["CURV"][0]).max()) < 3
 
 
+def test_any_other_cyclic_motion_is_a_class(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Hops, with both legs at a time, which are refused as a walk."""
+    for k in range(3):
+        motion = {"period": 90.0, "speed": 0.6, "together": True}
+        mocap_files.write_toy(tmp_path / "hops", f"{k}_01", frames=400, offset=10.0 * k, **motion)
+    words = ["-o", str(tmp_path / "m.gait"), "--segments", "none", "--jobs", "1", "--components", "1"]
+    assert main(["learn", str(tmp_path / "hops"), *words]) == 1
+    assert "not learnt as 'walk': the legs do not alternate" in capsys.readouterr().err
+    assert main(["learn", str(SHIPPED), *words, "--class", f"hop={tmp_path / 'hops'}"]) == 0
+    assert "class hop: 'hop' is none of walk, " in capsys.readouterr().err
+    assert main(["info", str(tmp_path / "m.gait")]) == 0
+    assert "class hop: recorded: 3 recordings, 13 cycles, 1.33 strides/s" in capsys.readouterr().out
+    model = gait.Model(tmp_path / "m.gait")
+    state = gait.State(motion_class=model.classes.index("hop"), phase=0.3)
+    at = dict(zip(model.joint_names, model.pose(state)[0], strict=True))
+    assert abs(at["l_ankle"][0] - at["r_ankle"][0]) < 0.02
+
+
 def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "m.gait"
     words = ["--class", "backwards", "--class", "stand", "--class", f"stroll={SHIPPED}"]
@@ -262,7 +280,7 @@ def test_classes_are_added_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixt
     assert main(["learn", str(SHIPPED), "-o", str(tmp_path / "x.gait")]) == 1
     assert "walk.gait: is a model, not a recording; to add to a model" in capsys.readouterr().err
     assert main(["learn", str(SHIPPED), "-o", str(out), "--class", "run"]) == 2
-    assert "--class run: give recordings" in capsys.readouterr().err
+    assert "--class run: the source is a model, which has no recordings; give a" in capsys.readouterr().err
     assert main(["learn", str(SHIPPED), "-o", str(out), *words, "--report", str(tmp_path / "report")]) == 2
     assert "--report: draws what is learnt from recordings" in capsys.readouterr().err
 
@@ -369,7 +387,11 @@ def test_standing_is_learnt_from_people_who_stand(
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (["limp"], "--class limp: give recordings"),
+        (
+            ["hop"],
+            "--class hop: only run, backwards and stand are sorted out of the sources; give a folder of "
+            "recordings, --class hop=FOLDER",
+        ),
         (["stand", "stand"], "--class stand: give each class its own name"),
         (["walk"], "--class walk: give each class its own name, not walk"),
         (

@@ -76,7 +76,7 @@ def check(options: LearnOptions, note: Note = lambda line: None) -> None:
         raise UsageError("--report draws the cyclic model; leave it out, or --segments only")
     if options.activity.lower() not in verdict.NAMES:
         names = ", ".join(verdict.NAMES)
-        note(f"--activity {options.activity}: none of {names}: any cyclic motion is accepted")
+        note(f"{options.activity!r} is none of {names}: any cyclic motion is accepted")
     output, report = Path(os.path.realpath(options.output)), options.report
     if output.suffix.lower() in (*SUFFIXES, ".asf"):
         raise UsageError(

@@ -284,7 +284,9 @@ def _parsed(options: LearnOptions, names: Sequence[str]) -> dict[str, str]:
         ]:
             raise UsageError(f"--class {text}: differs from the class {like[0]} only by case; rename it")
         if not source and (name not in (*DERIVED, RUN) or (name == RUN and adds_to_a_model(options))):
-            raise UsageError(f"--class {text}: give recordings, --class {name}=FOLDER")
+            why = "only run, backwards and stand are sorted out of the sources"
+            why = "the source is a model, which has no recordings" if name == RUN else why
+            raise UsageError(f"--class {text}: {why}; give a folder of recordings, --class {name}=FOLDER")
         wanted[name] = source
     if (count := len({*names, *wanted})) > MAX_CLASSES:
         most = f"a model has at most {MAX_CLASSES}; leave some out"
