@@ -24,37 +24,48 @@ CLASSES = SHIPPED.with_name("classes.gait")
 def test_files_learnt_as_another_class_are_not_reported_as_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Runs when the walk is learnt, and walks when the run is."""
+    """One line about each file that is in no class, as a run if it is one."""
     reported = {}
-    lines = (
-        "r.amc: not learnt as 'walk': this is running; leave it out, or give --activity run",
-        "w.amc: not learnt as 'run': this is not running; leave it out, or give --activity walk",
-        "bad.amc: cannot be read",
-    )
+    a_run, a_walk = (f"leave it out, or give --activity {name}" for name in ("run", "walk"))
+    lines = {
+        "walk": (
+            f"r.amc: not learnt as 'walk': this is running; {a_run}",
+            f"short.amc: not learnt as 'walk': this is running; {a_run}",
+            "back.amc: not learnt as 'walk': the walk is backwards; leave it out",
+            "bad.amc: cannot be read",
+        ),
+        "run": (
+            f"w.amc: not learnt as 'run': this is not running; {a_walk}",
+            "short.amc: not learnt as 'run': too little of each cycle is observed; leave it out",
+            f"back.amc: not learnt as 'run': this is not running; {a_walk}",
+            "bad.amc: cannot be read",
+        ),
+    }
 
-    def learnt(options, note, complete=lambda sections: sections, elsewhere=lambda line: False, only=()):
-        reported[options.activity] = [line for line in lines if not elsewhere(line)]
+    def learnt(options, note, complete=lambda sections: sections, left_out=lambda line: line, only=()):
+        found = map(left_out, lines[options.activity])
+        reported[options.activity] = [line for line in found if line]
         blob.write(options.output, complete(blob.read(SHIPPED)))
         return {"sequences": [{"source": f"{options.activity[0]}.amc"}]}
 
     monkeypatch.setattr(class_run, "run", learnt)
     monkeypatch.chdir(tmp_path)
-    names = ("r.amc", "w.amc", "bad.amc")
+    names = ("r.amc", "w.amc", "short.amc", "back.amc", "bad.amc")
     for name in names:
         Path(name).touch()
     options = LearnOptions(sources=names, output=str(tmp_path / "m.gait"), classes=("run",))
     figures = class_run.learn(options, lambda line: None)
     assert [one["name"] for one in figures["classes"]] == ["walk", "run"]
-    assert reported == {"run": [lines[0], lines[2]], "walk": [lines[1], lines[2]]}
+    assert reported == {"run": [], "walk": [lines["run"][1], *lines["walk"][2:]]}
 
 
 def test_walks_backwards_have_the_static_trials_of_their_people(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def learnt(options, note, complete=lambda sections: sections, elsewhere=lambda line: False, only=()):
+    def learnt(options, note, complete=lambda sections: sections, left_out=lambda line: line, only=()):
         asked.append((options.reverse, options.static, only))
-        taken = elsewhere("in/anna_2.trc: not learnt as 'walk': ...; or give --class backwards=FOLDER")
-        assert taken == (not options.reverse)
+        line = "in/anna_2.trc: not learnt as 'walk': ...; or give --class backwards=FOLDER"
+        assert left_out(line) == (line if options.reverse else "")
         blob.write(options.output, complete(blob.read(SHIPPED)))
         return {"sequences": [{"source": "in/anna_2.trc"}]}
 

@@ -205,14 +205,16 @@ def test_a_class_without_recordings_among_the_sources_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def no_runs(*given: object, **more: object) -> None:
-        raise NothingLeft(["a.amc: not learnt as 'run': this is not running"])
+        words = "this is not running; leave it out"
+        walk = f"a.amc: not learnt as 'run': {words}, or give --activity walk"
+        raise NothingLeft([walk, f"b.amc: not learnt as 'run': {words}"])
 
     monkeypatch.setattr(class_run, "run", no_runs)
     out = tmp_path / "m.gait"
     (tmp_path / "a.amc").touch()
     assert main(["learn", str(tmp_path), "-o", str(out), "--class", "run"]) == 1
     error = capsys.readouterr().err
-    assert "--class run: none of the recordings is a run (a.amc: " in error
+    assert "--class run: none of the recordings is a run (b.amc: " in error
     assert "give --class run=FOLDER, or leave it out" in error and not out.exists()
 
 
@@ -228,7 +230,7 @@ def test_what_belongs_elsewhere_is_neither_noted_nor_counted(
         jobs=1,
         quiet=True,
     )
-    figures = class_run.run(options, notes.append, elsewhere=lambda line: "01_02x" in line)
+    figures = class_run.run(options, notes.append, left_out=lambda line: "" if "01_02x" in line else line)
     assert figures["left_out"] == [] and not any("left out" in line for line in notes)
     capsys.readouterr()
     assert main(["info", options.output]) == 0

@@ -38,19 +38,19 @@ def run(
     options: LearnOptions,
     note: Note = lambda line: None,
     complete: Callable[[Sections], Sections] = lambda sections: sections,
-    elsewhere: Callable[[str], bool] = lambda line: False,
+    left_out: Callable[[str], str] = lambda line: line,
     only: Collection[Path] = (),
 ) -> dict[str, Any]:
     """Learn a model, write it and its report, and return the figures of `report.summary`.
 
     `note` gets lines that a user should know.  `complete` adds to the sections of the model before they are
-    written.  Lines about files left out are not reported if `elsewhere` is true for them: the files belong to
-    another class.  ``only``: files of the sources to learn from, if not all.  UsageError or UserError with
-    one line if it cannot be done.
+    written.  `left_out` returns what to report about a file that was left out, from the line about it; '' if
+    it belongs to another class.  ``only``: files of the sources to learn from, if not all.  UsageError or
+    UserError with one line if it cannot be done.
     """
     check(options, note)
     with one_thread(), Corpus() as corpus:
-        loaded = _load(options, corpus, note, elsewhere, only)
+        loaded = _load(options, corpus, note, left_out, only)
         if options.segments.source == "only":
             return _segments_alone(options, corpus, loaded.refused)
         learned = fit.fit(loaded.sequences, options, loaded.others)
@@ -102,7 +102,7 @@ def _load(
     options: LearnOptions,
     corpus: Corpus,
     note: Note,
-    elsewhere: Callable[[str], bool],
+    left_out: Callable[[str], str],
     only: Collection[Path],
 ) -> load.Loaded:
     """Find and prepare the files; report files that were left out, and the readers' observations."""
@@ -124,13 +124,17 @@ def _load(
             loaded = load.load_all(files, options, update, corpus=corpus, shared=shared, notes=notes)
         except UserError as error:
             if isinstance(error, load.NothingLeft):
-                _note_left_out(closed + error.refused[1:], "", note)
+                _note_left_out(_reported(closed + error.refused[1:], left_out), "", note)
             _note_all(_hints(options, notes), note)  # they may be the reason
             raise
-    refused = [line for line in closed + loaded.refused if not elsewhere(line)]
+    refused = _reported(closed + loaded.refused, left_out)
     _note_left_out(refused, " (see --json or --report)", note)
     _note_all(_hints(options, notes), note)
     return loaded._replace(refused=refused)
+
+
+def _reported(lines: list[str], left_out: Callable[[str], str]) -> list[str]:
+    return [reported for line in lines if (reported := left_out(line))]
 
 
 def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:

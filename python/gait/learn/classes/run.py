@@ -25,7 +25,7 @@ from gait.learn.classes import changes, standing
 from gait.learn.classes.join import Change, MotionClass, classes_of, join
 from gait.learn.corpus.load import NothingLeft, static_trials
 from gait.learn.corpus.sources import find, subjects
-from gait.learn.cycles.sequence import AS_BACKWARDS
+from gait.learn.cycles.sequence import AS_ACTIVITY, AS_BACKWARDS
 from gait.learn.cycles.verdict import NAMES
 from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.prior import model
@@ -97,7 +97,8 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         if name == STAND:
             posture = _mean_posture(_postures(source, options, note), options) if source else None
         elif source or name != BACKWARDS:
-            learnt[name], files = _learnt(name, source, options, note)
+            refused = None if source else sorter.not_runs
+            learnt[name], files = _learnt(name, source, options, note, refused)
             sorter.runs |= set() if source else files
 
     def with_classes(walk: Mapping[str, blob.Array]) -> dict[str, blob.Array]:
@@ -123,7 +124,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         data = blob.write(options.output, with_classes(own))
         figures: dict[str, Any] = {"bytes": len(data), "crc32": f"{blob.checksum(data):08x}"}
     else:
-        figures = run(alone, note, with_classes, sorter.takes)
+        figures = run(alone, note, with_classes, sorter.left_out)
         data = Path(options.output).read_bytes()
     return figures | {"classes": class_figures(blob.decode(data))}
 
@@ -136,6 +137,7 @@ class _Sorter:
     note: Note
     names: Collection[str]  #: classes, of `DERIVED`, whose recordings to find
     runs: set[str] = field(default_factory=set)  #: files that are learnt as runs
+    not_runs: list[str] = field(default_factory=list)  #: a line about each of the others
     backwards: set[Path] = field(default_factory=set)
     stands: dict[Path, Floats] = field(default_factory=dict)  #: postures
 
@@ -144,11 +146,13 @@ class _Sorter:
         """Return the files of the sources."""
         return [path for path, _ in find(self.options.sources, self.options.exclude)[0]]
 
-    def takes(self, line: str) -> bool:
-        """Whether a file that was left out, with this line about it, belongs to another class."""
+    def left_out(self, line: str) -> str:
+        """Return what to report about a file left out, from the line about it; '' if a class takes it."""
         path = next((path for path in self.files if line.startswith(f"{path}: ")), None)
-        if path is None or str(path) in self.runs:
-            return path is not None
+        if path is None:
+            return line
+        if str(path) in self.runs:
+            return ""
         if BACKWARDS in self.names and AS_BACKWARDS in line:
             self.backwards.add(path)
         elif STAND in self.names:
@@ -156,7 +160,11 @@ class _Sorter:
                 self.stands[path] = standing.posture_of(
                     path, readers.read(path, self.options), throughout=True
                 )
-        return path in self.backwards or path in self.stands
+        if path in self.backwards or path in self.stands:
+            return ""
+        if f"{AS_ACTIVITY}{RUN}" in line:
+            return next((other for other in self.not_runs if other.startswith(f"{path}: ")), line)
+        return line
 
     def backward_walks(self) -> dict[str, MotionClass]:
         """Learn the walks backwards; empty if there are none, or too few."""
@@ -168,7 +176,7 @@ class _Sorter:
             own = {str(trial): None for path, trial in trials if trial and path in self.backwards}
             options = replace(self.options, static=tuple(own))  # those of others would be unused
             try:
-                learnt, files = _learnt(BACKWARDS, "", options, self.note, self.backwards)
+                learnt, files = _learnt(BACKWARDS, "", options, self.note, only=self.backwards)
             except UserError as exc:
                 why = str(exc)
             else:
@@ -352,16 +360,24 @@ def _taken(name: str, source: str) -> MotionClass:
 
 
 def _learnt(
-    name: str, source: str, options: LearnOptions, note: Note, only: Collection[Path] = ()
+    name: str,
+    source: str,
+    options: LearnOptions,
+    note: Note,
+    refused: list[str] | None = None,
+    only: Collection[Path] = (),
 ) -> tuple[MotionClass, set[str]]:
     """Learn a class from recordings; return also the files that were used.
 
     Without a source, they are among the sources of the first class: those of `only`, or those that are
-    accepted.
+    accepted.  Lines about others are added to `refused` if it is given, and reported otherwise.
     """
 
-    def of_the_first(line: str) -> bool:
-        return not source and line.endswith(f"give --activity {options.activity}")
+    def left_out(line: str) -> str:
+        if refused is None:
+            return line
+        refused.append(line)
+        return ""
 
     with tempfile.TemporaryDirectory() as folder:
         own = replace(
@@ -376,12 +392,13 @@ def _learnt(
             several=True,
         )
         try:
-            figures = run(own, lambda line: note(f"class {name}: {line}"), elsewhere=of_the_first, only=only)
+            figures = run(own, lambda line: note(f"class {name}: {line}"), left_out=left_out, only=only)
         except NothingLeft as exc:
             if source or only:
                 raise
+            why = next((line for line in exc.refused if f"{AS_ACTIVITY}{WALK}" not in line), exc.refused[0])
             remedy = f"give --class {name}=FOLDER, or leave it out"
-            raise UserError(f"--class {name}: none of the recordings is a {name} ({exc}); {remedy}") from None
+            raise UserError(f"--class {name}: none of the recordings is a {name} ({why}); {remedy}") from None
         except UserError as exc:
             raise UserError(f"class {name}: {exc}") from None
         found = blob.read(own.output)

@@ -18,8 +18,8 @@ from gait.learn.solve import readers, retarget
 from gait.learn.solve.body import Body
 
 YAW = ROOTS.index("root_yaw")
-#: Remedy for a walk backwards, by which `gait.learn.classes.run` sorts it out.
-AS_BACKWARDS = "--class backwards=FOLDER"
+#: Remedies for walks backwards, and for runs and walks, by which `gait.learn.classes.run` sorts recordings.
+AS_BACKWARDS, AS_ACTIVITY = "--class backwards=FOLDER", "--activity "
 OBSERVED_PHASES = 64  # phases at which the observed share of a cycle is counted
 
 
@@ -123,7 +123,7 @@ def _long(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequenc
     if not judged.cyclic and (words := _too_short(whole, read.fps)):
         raise _refused(path, wanted, words)
     if not judged.accepted:
-        remedy = "--activity " + judged.activity if {judged.activity, wanted} == {"walk", "run"} else ""
+        remedy = AS_ACTIVITY + judged.activity if {judged.activity, wanted} == {"walk", "run"} else ""
         if judged.backwards and verdict.NAMES.get(wanted.lower()) == "walk":
             remedy = AS_BACKWARDS
         raise _refused(path, wanted, judged.reason, remedy)
