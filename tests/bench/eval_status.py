@@ -40,7 +40,8 @@ Shares are of the frames in which all joints are in the picture. good: knees and
 person's height on average in the picture, hips in place; swap: left and right swapped; off: hips or legs
 elsewhere. wrong: share of the frames with status `tracking` that are not good; far: that are more than
 150 mm off in space, root-aligned. Root-aligned and absolute error of 15 joints in space, and error of
-the heading: medians over the frames with status `tracking`."""
+the heading: medians over the frames with status `tracking`. Stride rate: its error over the frames that
+have a phase, of people who never stand."""
 
 
 def main() -> int:

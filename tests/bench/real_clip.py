@@ -15,7 +15,7 @@ import numpy as np
 from gait import Camera, Video
 from gait.body.skeleton import EVAL15
 from gait.io import keypoints_file
-from gait.io.track_file import Track, read_truth
+from gait.io.track_file import Track, read_true_phase, read_truth
 from gait.motion.evaluate import root_errors
 from gait.motion.footfalls import strikes_of
 from gait.report.drawing import draw_bones
@@ -45,7 +45,7 @@ class Clip:
         Frames in which the person walks in full view.
     fps, stature : float
     stride_hz : float or None
-        Counted in the pictures; of the strikes where only these were counted.
+        Counted in the pictures; of the strikes where only these were counted.  None if there is none.
     strikes : list of (float, float)
         Frame of a heel strike in the pictures, and its phase: 0 right, 0.5 left.
     reference : dict of int to Points
@@ -121,7 +121,7 @@ def rate_of(strikes: list[tuple[float, float]], fps: float) -> float | None:
 def from_truth(folder: Path) -> Clip:
     """Describe a clip of `gait simulate`, or one like it, with the true joints as the reference.
 
-    Frames with a joint outside the picture do not count.
+    Frames with a joint outside the picture do not count.  A person who stands at times has no stride rate.
     """
     meta, truth = json.loads((folder / "meta.json").read_text()), read_truth(folder / "truth.csv")
     names = (*JOINTS, "l_heel", "r_heel", "head_top")
@@ -137,6 +137,8 @@ def from_truth(folder: Path) -> Clip:
     known = strikes_of(truth, folder / "meta.json")
     feet = ((known.right, 0.0), (known.left, 0.5))
     strikes = [(float(frame), phase) for frames, phase in feet for frame in frames]
+    phase = read_true_phase(folder / "truth.csv")
+    stands = phase is not None and np.isnan(phase).any()
     return Clip(
         folder,
         folder / "video.mp4",
@@ -144,7 +146,7 @@ def from_truth(folder: Path) -> Clip:
         last=max(reference),
         fps=meta["fps"],
         stature=meta.get("stature_m") or meta["limb_lengths_m"]["stature"],
-        stride_hz=rate_of(strikes, meta["fps"]),
+        stride_hz=None if stands else rate_of(strikes, meta["fps"]),
         strikes=strikes,
         reference=reference,
     )

@@ -11,6 +11,8 @@ from test_evaluate import FIRST_PHASE, RATE, TRUTH, track
 from gait import Camera
 from gait.cli import main
 from gait.io.track_file import read_estimates
+from gait.simulate.clip import simulate
+from gait.simulate.scenario import Scenario
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import eval_real
@@ -84,6 +86,17 @@ def test_a_person_who_stands_at_first_has_no_rate_there():
     blank = np.where(walk.frame < 20, np.nan, walk.phase)
     score = real_clip.score(clip(strikes=late), replace(walk, phase=blank), CAMERAS)
     assert abs(score.stride_error) < 1e-6 and score.strike_error < 1e-3
+
+
+def test_a_person_who_stands_at_times_has_no_rate(tmp_path):
+    simulate(Scenario(frames=60, size=(96, 72), noise=0.0), tmp_path)
+    assert real_clip.from_truth(tmp_path).stride_hz == pytest.approx(0.9, abs=0.2)
+    truth = tmp_path / "truth.csv"
+    head, *rows = truth.read_text().splitlines()
+    classes = ["walk"] * (len(rows) - 1) + ["stand"]
+    lines = [f"{row},{name}" for row, name in zip([head, *rows], ["motion_class", *classes], strict=True)]
+    truth.write_text("\n".join([*lines, ""]))
+    assert real_clip.from_truth(tmp_path).stride_hz is None
 
 
 def test_a_track_elsewhere_is_wrong_only_under_tracking():
