@@ -274,6 +274,19 @@ def test_zeros_are_hinted_at_once(amc, tmp_path, capsys):
     assert not printed(capsys, *words, "--quiet")
 
 
+def test_belts_and_walks_in_place_are_reported(tmp_path, capsys):
+    files.write_toy(tmp_path / "walks", "77_01", frames=400, speed=0.0)
+    files.write_toy(tmp_path / "walks", "77_02", frames=400, speed=0.0, swing=0.5, period=190.0)
+    files.write_toy(tmp_path / "walks", "77_03", frames=400)
+    words = (tmp_path / "walks", "-o", tmp_path / "m.gait", "--components", 1)
+    err = printed(capsys, *words)
+    assert re.search(r"/77_01.amc: on a treadmill: shifted at the belt's 0.9\d m/s, by the feet\n", err)
+    in_place = "stays in place, and the feet do not slide at one speed: learnt without the speed of a belt"
+    assert f"/77_02.amc: {in_place}\n" in err
+    assert err.count("treadmill") == err.count("stays in place") == 1
+    assert not printed(capsys, *words, "--quiet")
+
+
 @pytest.mark.long
 def test_labels_of_no_marker_and_a_mapping_without_markers_are_reported(amc, tmp_path, capsys):
     for k in (1, 2):
