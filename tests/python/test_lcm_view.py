@@ -29,6 +29,7 @@ from gait.live import feed as feeds
 from gait.live import server
 from gait.live.feed import PLOTTED, Drops, Feed
 from gait.live.server import Page
+from gait.report import drawing
 from gait.report.drawing import Overlay
 from gait.web import serve
 
@@ -90,6 +91,24 @@ def test_each_estimate_is_drawn_into_its_own_frame(log):
         estimate = estimate_of(estimates[i], classes_at(i) if i != 4 else None)
         estimate = replace(estimate, utime=rig.utime(i) - rig.utime(0))
         np.testing.assert_array_equal(picture, overlay.draw(rig.picture(i), estimate, i))
+
+
+def test_the_class_has_a_line_in_the_picture_if_there_are_several(log, monkeypatch):
+    written, write = [], drawing._write
+
+    def note(region, words, *style):
+        written.append(words)
+        write(region, words, *style)
+
+    monkeypatch.setattr(drawing, "_write", note)
+    overlay = Overlay(rig.model(), rig.CAMERA)
+    estimates = estimate_of(log[1][0]), estimate_of(log[1][0], classes_at(0))
+    pictures = [overlay.draw(rig.picture(0), estimate, 0) for estimate in estimates]
+    one, two = np.split(written, [len(written) // 2])
+    assert [words for words in two if words not in one] == ["run 88 %"] and len(two) == len(one) + 1
+    rows = np.flatnonzero((pictures[0] != pictures[1]).any((1, 2)))
+    panel = round(0.6 * (8 + 92)), round(0.6 * (8 + 92 + 18))  # its foot with one class and with several
+    assert rows[0] < panel[0] < rows[-1] <= panel[1]
 
 
 @pytest.mark.parametrize(
