@@ -3,9 +3,9 @@
 
     .venv/bin/python tests/bench/learn_people.py ../shared/data/mocap
 
-Mean angles and proportions by source show where joint centres differ, before and after the joints of CMU's
-skeletons are moved to the anatomical ones.  Floors are those of learn_floor.py, as tracked: of the model of
-CMU's people alone, and of the model of all people whose licence permits shipping.
+Mean angles, proportions and places of hips and neck by source show where joint centres differ, before and
+after the joints of CMU's skeletons are moved to the anatomical ones.  Floors are those of learn_floor.py, as
+tracked: of the model of CMU's people alone, and of the model of all people whose licence permits shipping.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,7 @@ OTHERS = ("ammr", "nimble", "ezc3d", "gaittoolbox", "c3dorg")
 UNEVEN = ("step_time_s", "stance_percent")
 SCALED = ("cmu_more",)  # lengths of limbs are generic there
 ACCLAIM = (CMU, "cmu_more")  # skeletons of CMU
+MARKERS = tuple(source for source in (*FREE, *OTHERS) if source not in ("bvhtoolbox", *ACCLAIM))
 FOLDS, EVERY = 4, 0.1  # groups of people left out, seconds between the frames compared
 HEAD = 0.2  # metres above the neck, for recordings without a head
 RECORDED, ANATOMICAL = JOINT_CENTRES
@@ -56,6 +57,13 @@ MEAN, SHIPPED = "mean", "as shipped"  # bodies
 #: Heels and toes by what is known of them: a strike is where the ankle is furthest ahead if there is no heel.
 FOOT = {"heel": ("heel", "ankle"), "toe": ("toe", "ankle")}
 SHOWN = ("hip_flexion", "knee_flexion", "ankle_flexion", "shoulder_flexion", "shoulder_rotation")
+PLACES = (
+    "hips apart",
+    "hips ahead of ankles",
+    "neck above hips",
+    "neck ahead of hips",
+    "neck above shoulders",
+)
 NOTE = """\
 {walks} walks of {count} people; the people of a source have equal weights.  Angles are means over whole
 cycles and both sides, degrees; lengths are shares of the stature, per cent.  *anatomical*: `gait learn
@@ -67,10 +75,20 @@ median over people; the scatter of their few strides is part of them.
 Floors, mm, median and mean over people: 14 joints after alignment of the pelvis, with 5 components and
 offsets of trunk, shoulders and elbows as in the tracker.  *body*: the mean of the learners', or *as shipped*,
 the one that `gait learn` makes, whose joints are in anatomical places.  {folds} groups are left out of every
-source at once; people with recordings of the legs alone are not among the learners.
-People from elsewhere are the {new} whose whole body was recorded.
+source at once; people whose recordings show no arms are not among the learners.  People from elsewhere are
+the {new} whose whole body was recorded.  Of the people whose licence permits it, seven are not among those of
+the shipped `classes`: b3, b4, b5, b6, g2 and p1, who show no arms, so they are not among the learners here
+either; and c47, who is one here, because 2.4 strides of a turn by 137 degrees would make the strides of the
+model vary too much.
 
 {floors}
+
+Places of hips and neck: means over whole cycles in the axes of the pelvis, in brackets the standard deviation
+between people; shares of the stature, per cent.  *hips*: the point midway between both, and so for ankles and
+shoulders.  With markers the distance of the neck from the shoulders is that of the fitted skeleton.  Lengths
+of `cmu_more` are those of generic skeletons.
+
+{places}
 """
 
 
@@ -108,23 +126,69 @@ def load(folder: Path, joints: str, wanted: tuple[str, ...]) -> list[Person]:
     return found
 
 
+def by_person(some: list[Person], values: Callable[[Person], list[float]]) -> Floats:
+    """Values (people, n): means over the walks of each person."""
+    found: dict[str, list[list[float]]] = {}
+    for one in some:
+        found.setdefault(one.walk.subject, []).append(values(one))
+    return np.array([np.nanmean(rows, axis=0) for rows in found.values()])
+
+
 def row(name: str, some: list[Person]) -> list[Any]:
     """Cells of the table of a source."""
-    by_person: dict[str, list[list[float]]] = {}
-    for one in some:
-        walk = one.walk
-        whole = walk.channels[: int(int(walk.cycles) * walk.period.frames)]
-        angles = [
-            float(np.degrees(np.nanmean(whole[:, [ANGLES.index(f"{s}_{angle}") for s in SIDES]])))
-            for angle in SHOWN
-        ]
-        m = walk.measures or retarget.measure(retarget.levelled(one.body.part(*walk.kept)))
-        parts = (m.thigh, m.shank, m.sole, m.shoulder[:, 2], m.upper_arm, m.forearm)
-        lengths = [100 * float(np.mean(part)) / m.stature for part in parts]
-        by_person.setdefault(walk.subject, []).append([*angles, *lengths])
-    means = np.nanmean([np.nanmean(rows, axis=0) for rows in by_person.values()], axis=0)
-    values = [*means, *usual_asymmetries(some)]
-    return [name, len(by_person), *(f"{value:.1f}" if np.isfinite(value) else None for value in values)]
+    people_of = by_person(some, angles_and_lengths)
+    values = [*np.nanmean(people_of, axis=0), *usual_asymmetries(some)]
+    return [name, len(people_of), *(f"{value:.1f}" if np.isfinite(value) else None for value in values)]
+
+
+def cycles_of(one: Person) -> slice:
+    """Return the frames of whole cycles."""
+    return slice(int(int(one.walk.cycles) * one.walk.period.frames))
+
+
+def angles_and_lengths(one: Person) -> list[float]:
+    """Mean angles SHOWN, degrees, and lengths of limbs, per cent of the stature."""
+    whole = one.walk.channels[cycles_of(one)]
+    angles = [
+        float(np.degrees(np.nanmean(whole[:, [ANGLES.index(f"{s}_{angle}") for s in SIDES]])))
+        for angle in SHOWN
+    ]
+    m = one.walk.measures or retarget.measure(retarget.levelled(one.body.part(*one.walk.kept)))
+    parts = (m.thigh, m.shank, m.sole, m.shoulder[:, 2], m.upper_arm, m.forearm)
+    return [*angles, *(100 * float(np.mean(part)) / m.stature for part in parts)]
+
+
+def places_of(one: Person) -> list[float]:
+    """Mean PLACES of a walk, per cent of the stature."""
+    body = retarget.levelled(one.body.part(*one.walk.kept))
+    stature = (one.walk.measures or retarget.measure(body)).stature
+    joints, cycles = body.joints, cycles_of(one)
+
+    def between(start: Floats, end: Floats) -> Floats:
+        local = np.einsum("tji,tj->ti", body.pelvis, end - start)
+        return np.asarray(100 * np.nanmean(local[cycles], axis=0) / stature)
+
+    ankles, shoulders = ((joints[f"l_{name}"] + joints[f"r_{name}"]) / 2 for name in ("ankle", "shoulder"))
+    hips, neck = joints["pelvis"], joints["neck"]
+    ahead, _, above = between(hips, neck)
+    return [
+        float(between(joints["r_hip"], joints["l_hip"])[1]),
+        float(between(ankles, hips)[0]),
+        float(above),
+        float(ahead),
+        float(between(shoulders, neck)[2]),
+    ]
+
+
+def place_row(name: str, some: list[Person]) -> list[str]:
+    """Cells of the table of PLACES."""
+    found = by_person(some, places_of)
+    cells = []
+    for column in found.T:
+        known = column[np.isfinite(column)]
+        spread = f" ({known.std(ddof=1):.1f})" if len(known) > 1 else ""
+        cells.append(f"{known.mean():.1f}{spread}" if len(known) else "-")
+    return [name, str(len(found)), *cells]
 
 
 def usual_asymmetries(some: list[Person]) -> list[float]:
@@ -238,13 +302,20 @@ def floor_table(kinds: dict[str, list[Person]]) -> tuple[str, int]:
     )
 
 
-def tables(kinds: dict[str, list[Person]]) -> Iterable[list[Any]]:
-    """Rows by source, as recorded and moved."""
+def sources(kinds: dict[str, list[Person]]) -> Iterator[tuple[str, list[Person]]]:
+    """Yield the people of each source, those of CMU's skeletons as recorded and moved."""
     for name in (CMU, *FREE, *OTHERS):
         for kind, all_people in kinds.items():
             some = [one for one in all_people if one.source == name]
             if some and (kind == RECORDED or name in ACCLAIM):
-                yield row(f"{name}, {kind}" if name in ACCLAIM else name, some)
+                yield (f"{name}, {kind}" if name in ACCLAIM else name), some
+
+
+def place_table(kinds: dict[str, list[Person]]) -> str:
+    """Places of hips and neck by source, and of all people with markers."""
+    marked = [one for one in kinds[RECORDED] if one.source in MARKERS]
+    rows = [place_row(*each) for each in (*sources(kinds), ("all with markers", marked))]
+    return table.markdown(["source", "people", *PLACES], rows, [False] + [True] * (1 + len(PLACES)))
 
 
 def main() -> int:
@@ -263,11 +334,13 @@ def main() -> int:
     kinds = {RECORDED: found, ANATOMICAL: [*load(folder, ANATOMICAL, ACCLAIM), *others]}
     written, new = floor_table(kinds)
     count = len({one.walk.subject for one in found})
-    note = NOTE.format(walks=len(found), count=count, folds=FOLDS, new=new, floors=written)
+    places = place_table(kinds)
+    note = NOTE.format(walks=len(found), count=count, folds=FOLDS, new=new, floors=written, places=places)
     lengths = ("thigh", "shank", "sole", "shoulder", "upper arm", "forearm")
     uneven = ("step time asym.", "stance asym.")
+    rows = [row(*each) for each in sources(kinds)]
     columns = ["source", "people", *(name.replace("_", " ") for name in SHOWN), *lengths, *uneven]
-    table.publish("learn_people", "People of several sources", columns, list(tables(kinds)), note)
+    table.publish("learn_people", "People of several sources", columns, rows, note)
     return 0
 
 
