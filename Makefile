@@ -391,7 +391,7 @@ MOCAP ?= ../shared/data/mocap/cmu_walk
 MORE = $(MOCAP)/../more
 WALKING := btk/b2 gaitalytics/g1 bvhtoolbox opensim/p2 opensim/p4 mcgill cmu_more/c12 cmu_more/c46
 RUNNING := run_cmu run_rbds
-LEARN_CLASSES = $(VENV)/bin/gait learn --subjects folder --segments none
+LEARN_CLASSES = $(VENV)/bin/gait learn --subjects folder --segments none --joints anatomical
 # Credits of these people, besides CMU's.
 CREDIT_RUNS = --credit 'R. Fukuchi, C. Fukuchi and M. Duarte 2017, figshare 4543435, CC BY 4.0; 6 of 30 s of each run' \
     --credit 'Convolutional-Sequence-to-Sequence-Model-for-Human-Dynamics (copies of recordings of CMU), MIT'

@@ -104,7 +104,7 @@ def _add_recordings(group: argparse._ArgumentGroup) -> None:
         choices=JOINT_CENTRES,
         default=JOINT_CENTRES[0],
         help="joint centres of CMU's skeletons (.amc, .bvh made from them). recorded (default): as in the "
-        "file, also in the package's models. anatomical: where markers put them",
+        "file, also in the package's walk. anatomical: where markers put them, as in its classes",
     )
     _add_globs(
         group,
