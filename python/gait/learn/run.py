@@ -153,6 +153,9 @@ def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:
         path, parts = notes.lacking[0]
         names = ", ".join(parts[:MOST_NAMED_LABELS]) + (" ..." if len(parts) > MOST_NAMED_LABELS else "")
         yield f"{path}: has no {names}{_more(notes.lacking)}: learnt without; rename them if they are there"
+    if notes.parts:
+        path, part = notes.parts[0]
+        yield f"{path}: not one steady motion{_more(notes.parts)}: learnt from {part}"
     belts = [(path, speed) for path, speed in notes.belts if speed]
     if belts:
         path, speed = belts[0]

@@ -64,11 +64,14 @@ class RunNotes:
     zeros: list[tuple[Path, str]] = field(default_factory=list)
     lacking: list[tuple[Path, tuple[str, ...]]] = field(default_factory=list)
     belts: list[tuple[Path, float]] = field(default_factory=list)  #: speeds, of recordings learnt from
+    parts: list[tuple[Path, str]] = field(default_factory=list)  #: learnt from, of several motions
 
-    def add(self, path: Path, notes: FileNotes, learnt: bool) -> None:
-        """Add the notes of a file; `learnt`: whether it is learnt from."""
+    def add(self, path: Path, notes: FileNotes, learnt: Sequence | None) -> None:
+        """Add the notes of a file; `learnt`: what is learnt from it."""
         if learnt and notes.belt is not None:
             self.belts.append((path, notes.belt))
+        if learnt and learnt.part:
+            self.parts.append((path, learnt.part))
         self.labels |= notes.labels
         if notes.zeros:
             self.zeros.append((path, notes.zeros))
@@ -120,7 +123,7 @@ def load_all(
             generic = any(sources.matches(paths[i], glob) for glob in options.generic_lengths)
             measures.append(None if generic else outcome.body)
             if notes is not None:
-                notes.add(paths[i], outcome.notes, found is not None)
+                notes.add(paths[i], outcome.notes, found)
             if corpus is not None and outcome.motion is not None:
                 corpus.put(names[i], persons[i], paths[i], outcome.motion)
                 used = True

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,10 @@ YAW = ROOTS.index("root_yaw")
 #: Remedies for walks backwards, and for runs and walks, by which `gait.learn.classes.run` sorts recordings.
 AS_BACKWARDS, AS_ACTIVITY = "--class backwards=FOLDER", "--activity "
 OBSERVED_PHASES = 64  # phases at which the observed share of a cycle is counted
+#: Times that a refused recording is divided: a walk, a stand, a walk and a run need two.
+DIVISIONS = 2
+ANOTHER = "another motion"  # why a part is not kept
+Part = tuple[int, int]  # first frame, and one past the last
 
 
 @dataclass
@@ -38,9 +44,10 @@ class Sequence:
     #: (n,) durations of single strides, seconds: between forward extremes of an ankle, or of a knee's flexion
     #: if the file has only angles.
     strides: Floats
-    kept: tuple[int, int]  #: start and stop of these frames in the file
+    kept: Part  #: these frames in the file
     cut: tuple[str, str]  #: why frames before and after them were left out; '' if none were
     verdict: verdict.Verdict
+    part: str = ""  #: which part of the file this is, in words, if the file shows further motions
     #: Whether it has fewer cycles than `period.FEWEST_CYCLES`, so that more trials of the person are needed.
     short: bool = False
     recordings: int = 1  #: number of the person's recordings from which limb lengths were estimated
@@ -62,6 +69,31 @@ class _Motion:
     root: Floats | None = None
 
 
+class _Refused(UserError):
+    """Why a part of a recording is not learnt."""
+
+    def __init__(
+        self, reason: str, part: Part, steady: Part | None = None, cyclic: bool | None = None, other: str = ""
+    ) -> None:
+        super().__init__(reason)
+        self.part = part
+        self.steady = steady  #: its steady part; None if that is not why
+        self.cyclic = cyclic  #: whether the steady part shows cycles, of any kind; None if not judged
+        self.other = other  #: options that might help
+
+    @property
+    def frames(self) -> int:
+        """Frames of the steady part."""
+        return self.steady[1] - self.steady[0] if self.steady else 0
+
+    def parts(self, fewest: float) -> Iterator[Part]:
+        """Yield what is before, in and after the steady part, where that is less than all and long enough."""
+        edges = self.part[0], *(self.steady or ()), self.part[1]
+        for start, stop in pairwise(edges):
+            if fewest <= stop - start < self.part[1] - self.part[0]:
+                yield start, stop
+
+
 def load(path: Path, options: LearnOptions = DEFAULT) -> Sequence:
     """Read and prepare one file; the part of its name before '_' is the person's name."""
     return prepare(path, readers.read(path, options), options)
@@ -70,16 +102,59 @@ def load(path: Path, options: LearnOptions = DEFAULT) -> Sequence:
 def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT) -> Sequence:
     """Prepare the data read from a file.
 
-    A trial of little more than a stride is prepared from its steps (`Sequence.short`).  UserError if the
-    motion is not cyclic, is too short, or is of another activity.
+    A trial of little more than a stride is prepared from its steps (`Sequence.short`).  A recording that is
+    refused as a whole, as it shows several motions, is divided; the longest part that is accepted is used.
+    UserError if the motion is not cyclic, is too short, or is of another activity.
     """
     read = read.reversed() if options.reverse else read
     try:
-        return _long(path, read, options)
-    except UserError:
-        if (found := _short(path, read, options)) is not None:
-            return found
-        raise
+        return _long(path, read, options, (0, read.frames))
+    except _Refused as error:
+        refusals = [error]
+    if (found := _short(path, read, options)) is not None:
+        return found
+    if options.trim and (parts := _parts(path, read, options, refusals)):
+        return max(parts, key=lambda one: len(one.channels))
+    raise _explained(path, read, options, refusals)
+
+
+def _parts(
+    path: Path, read: Body | AngleTable, options: LearnOptions, refusals: list[_Refused]
+) -> list[Sequence]:
+    """Prepare the parts of a recording that was refused; add to `refusals` why others are refused."""
+    accepted, divided = list[Sequence](), refusals[:]
+    fewest = _fewest(read.fps, options.period_mode)
+    for _ in range(DIVISIONS):
+        parts, divided = [part for one in divided for part in one.parts(fewest)], []
+        for part in parts:
+            try:
+                accepted.append(_long(path, read, options, part))
+            except _Refused as error:
+                divided.append(error)
+        refusals += divided
+    return accepted
+
+
+def _explained(
+    path: Path, read: Body | AngleTable, options: LearnOptions, refusals: list[_Refused]
+) -> UserError:
+    """Return the error for a recording that is refused, first as a whole and then in parts."""
+    alike = [one for one in refusals if one.cyclic is refusals[0].cyclic]
+    shown = max([one for one in refusals if one.cyclic] or alike, key=lambda one: one.frames)
+    reason, remedy = f"{shown}", f", or give {shown.other}" if shown.other else ""
+    tried = (_short(path, read.part(*one.part), options) for one in refusals[1:])
+    if short := [one for one in tried if one is not None]:
+        longest = max(short, key=lambda one: len(one.channels))
+        frames, activity = len(longest.channels), verdict.NAMES[options.activity.lower()]
+        reason = (
+            f"several motions, of which the longest steady {activity} lasts {frames / read.fps:.1f} s, "
+            f"{_cycles(frames, longest.period.frames)}"
+        )
+    return UserError(f"{path}: not learnt as {_wanted(options)!r}: {reason}; leave it out{remedy}")
+
+
+def _wanted(options: LearnOptions) -> str:
+    return "backwards" if options.reverse else options.activity
 
 
 def _short(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequence | None:
@@ -89,6 +164,8 @@ def _short(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequen
     kept = steady.Kept(0, read.frames)
     if options.trim:
         kept = steady.active_part(_motion(read).angles, read.fps)
+    if kept.stop - kept.start >= period.FEWEST_CYCLES * period.SECONDS[1] * read.fps:
+        return None
     motion = _motion(read.part(kept.start, kept.stop))
     found = stride.find_by_steps(motion.angles, read.fps)
     if not kept.stop - kept.start < period.FEWEST_CYCLES * found.frames:
@@ -98,38 +175,66 @@ def _short(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequen
         return None
     if _outside(motion.angles, read.fps, found.frames, options.period_mode, repeats=True):
         return None
+    kept = _in_file(kept, (0, read.frames), read, options)
     made = _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
     return replace(made, short=True)
 
 
-def _long(path: Path, read: Body | AngleTable, options: LearnOptions) -> Sequence:
-    """Prepare a recording whose cycles repeat."""
-    motion = _motion(read)
-    kept, found, mode = steady.Kept(0, read.frames), None, options.period_mode
-    wanted = "backwards" if options.reverse else options.activity
+def _long(path: Path, read: Body | AngleTable, options: LearnOptions, part: Part) -> Sequence:
+    """Prepare a part of a recording whose cycles repeat; `_Refused` if it cannot be used."""
+    motion, mode = _motion(read.part(*part)), options.period_mode
+    whole, moving = motion.angles, steady.active_part(motion.angles, read.fps)
+    kept, found = steady.Kept(0, len(whole)), None
     if options.trim:
-        kept, found = steady.steady_part(motion.angles, read.fps, mode, motion.path)
-        if not kept.stop - kept.start >= period.FEWEST_CYCLES * found.frames:
-            outside = _outside(motion.angles, read.fps, found.frames, mode, repeats=False)
-            words = outside or _too_short(motion.angles, read.fps) or _unsteady(kept, found, read.fps)
-            raise _refused(path, wanted, words)
-    whole = motion.angles
-    if found is None or kept.stop - kept.start < read.frames:
-        motion = _motion(read.part(kept.start, kept.stop))
+        kept, found = steady.steady_part(whole, read.fps, mode, motion.path)
+    steadiest = part[0] + kept.start, part[0] + kept.stop
+    if found is not None and not kept.stop - kept.start >= period.FEWEST_CYCLES * found.frames:
+        outside = _outside(whole, read.fps, found.frames, mode, repeats=False)
+        if words := outside or _too_short(whole, read.fps):
+            raise _Refused(words, part)
+        raise _Refused(_unsteady(kept, found, read.fps), part, steadiest)
+    if found is None or kept.stop - kept.start < len(whole):
+        motion = _motion(read.part(*steadiest))
         found = stride.find(motion.angles, read.fps, mode)
     judged, channels, heading = _judge(motion, found, options)
-    if outside := _outside(motion.angles, read.fps, found.frames, mode, judged.cyclic):
-        raise _refused(path, wanted, outside)
+    if words := _outside(motion.angles, read.fps, found.frames, mode, judged.cyclic):
+        raise _Refused(words, part)
     if not judged.cyclic and (words := _too_short(whole, read.fps)):
-        raise _refused(path, wanted, words)
+        raise _Refused(words, part)
+    left = max(kept.start - moving.start, moving.stop - kept.stop)
+    kept = _in_file(kept, part, read, options)
+    span = f"{kept.start / read.fps:.1f} to {kept.stop / read.fps:.1f} s of {read.frames / read.fps:.1f} s"
+    where = f"{span}: " if read.frames - len(channels) >= _fewest(read.fps, mode) else ""
     if not judged.accepted:
-        remedy = AS_ACTIVITY + judged.activity if {judged.activity, wanted} == {"walk", "run"} else ""
-        if judged.backwards and verdict.NAMES.get(wanted.lower()) == "walk":
-            remedy = AS_BACKWARDS
-        raise _refused(path, wanted, judged.reason, remedy)
+        other = _remedy(judged, _wanted(options))
+        raise _Refused(where + judged.reason, part, steadiest, judged.cyclic, other)
     if not cutting.fewest_cycles(channels, found.frames, OBSERVED_PHASES):
-        raise _refused(path, wanted, "too little of each cycle is observed")
-    return _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
+        raise _Refused(f"{where}too little of each cycle is observed", part, steadiest, cyclic=True)
+    made = _sequence(path, read.fps, motion, kept, (judged, channels, heading), found)
+    alone = part == (0, read.frames) and left < period.FEWEST_CYCLES * found.frames
+    return made if alone else replace(made, part=span)
+
+
+def _remedy(judged: verdict.Verdict, wanted: str) -> str:
+    """Return the options with which a recording that is refused may be learnt, or ''."""
+    if judged.backwards and verdict.NAMES.get(wanted.lower()) == "walk":
+        return AS_BACKWARDS
+    return AS_ACTIVITY + judged.activity if {judged.activity, wanted} == {"walk", "run"} else ""
+
+
+def _fewest(fps: float, mode: str) -> float:
+    """Return the frames of the shortest motion that can be learnt."""
+    return period.FEWEST_CYCLES * period.seconds(mode)[0] * fps
+
+
+def _in_file(kept: steady.Kept, part: Part, read: Body | AngleTable, options: LearnOptions) -> steady.Kept:
+    """Return what is kept of a part, in frames of the file, which may be read in reversed time."""
+    start, stop = part[0] + kept.start, part[0] + kept.stop
+    before = steady.words(ANOTHER * (part[0] > 0), kept.before)
+    after = steady.words(kept.after, ANOTHER * (part[1] < read.frames))
+    if options.reverse:
+        return steady.Kept(read.frames - stop, read.frames - start, after, before)
+    return steady.Kept(start, stop, before, after)
 
 
 def _sequence(
@@ -188,12 +293,6 @@ def _is_stride(angles: Floats, frames: float) -> bool:
     return bool(verdict.legs(angles, frames) >= verdict.LEAST_LEG_ALTERNATION)
 
 
-def _refused(path: Path, wanted: str, reason: str, other: str = "") -> UserError:
-    """Return the error for a recording not learnt as the activity; `other`: options that might help."""
-    remedy = f"; leave it out, or give {other}" if other else "; leave it out"
-    return UserError(f"{path}: not learnt as {wanted!r}: {reason}{remedy}")
-
-
 def _too_short(angles: Floats, fps: float) -> str:
     """Explain that angles (T, 24) are too short to repeat, by what both sides share, or return ''."""
     moving = steady.active_part(angles, fps)
@@ -202,7 +301,7 @@ def _too_short(angles: Floats, fps: float) -> str:
         part = angles[moving.start : moving.stop]
         cycle = stride.find_by_steps(part, fps).frames
         if count < least * cycle and stride.step_repeats(part, cycle) >= verdict.REPEATS:
-            return f"{count / fps:.1f} s of motion are {count / cycle:.2f} cycles (at least {least})"
+            return f"{count / fps:.1f} s of motion are {_cycles(count, cycle)}"
     return ""
 
 
@@ -211,10 +310,12 @@ def _unsteady(kept: steady.Kept, found: period.Period, fps: float) -> str:
     if not np.isfinite(found.frames):
         return "no cycle found"
     frames = kept.stop - kept.start
-    return (
-        f"no steady motion: at most {frames / fps:.1f} s at a time, {frames / found.frames:.2f} cycles "
-        f"(at least {period.FEWEST_CYCLES})"
-    )
+    return f"no steady motion: at most {frames / fps:.1f} s at a time, {_cycles(frames, found.frames)}"
+
+
+def _cycles(frames: int, cycle: float) -> str:
+    """Describe too few cycles, rounded down."""
+    return f"{np.floor(100 * frames / cycle) / 100:.2f} cycles (at least {period.FEWEST_CYCLES})"
 
 
 def _motion(read: Body | AngleTable) -> _Motion:

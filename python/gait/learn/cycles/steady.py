@@ -64,7 +64,7 @@ def steady_part(angles: Floats, fps: float, mode: str, path: RootPath) -> tuple[
         if kept == before or kept.stop - kept.start < period.FEWEST_CYCLES * found.frames:
             break
         found = stride.find(angles[kept.start : kept.stop], fps, mode)
-    why = _words(moving.before, kept.before), _words(moving.after, kept.after)
+    why = words(moving.before, kept.before), words(moving.after, kept.after)
     return Kept(moving.start + kept.start, moving.start + kept.stop, *why), found
 
 
@@ -92,6 +92,12 @@ def longest_steady(angles: Floats, fps: float, cycle: float, path: RootPath) -> 
     return kept
 
 
+def words(*reasons: str) -> str:
+    """Join reasons, each once, without empty ones."""
+    each = " and ".join(reason for reason in reasons if reason).split(" and ")
+    return " and ".join(dict.fromkeys(each))
+
+
 def _within(angles: Floats, fps: float, cycle: float, path: RootPath, limit: float) -> Kept:
     """Find the longest interval in which the measures are near their medians over that interval."""
     frames, step = len(angles), max(1, round(cycle / 2))
@@ -114,16 +120,10 @@ def _within(angles: Floats, fps: float, cycle: float, path: RootPath, limit: flo
             break
         start, stop = run
     before, after = (
-        _words(*(word for word, mask in bad.items() if mask[part].any()))
+        words(*(word for word, mask in bad.items() if mask[part].any()))
         for part in (slice(0, start), slice(stop, frames))
     )
     return Kept(start, stop, before, after)
-
-
-def _words(*reasons: str) -> str:
-    """Join reasons, each once, without empty ones."""
-    words = " and ".join(word for word in reasons if word).split(" and ")
-    return " and ".join(dict.fromkeys(words))
 
 
 def _speed(angles: Floats, fps: float) -> tuple[Floats, Floats]:
