@@ -1,4 +1,4 @@
-"""Recordings that show several motions: the part that is learnt, and what the user is told."""
+"""Recordings that show several motions: the part that is learnt, and what is reported."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ def learn(*words: object) -> int:
         (MORE_WALK, "run", (5.4, 10.0)),
     ],
 )
-def test_the_longest_part_of_the_activity_is_learnt_and_told(tmp_path, capsys, row, activity, seconds):
+def test_the_longest_part_of_the_activity_is_learnt_and_named(tmp_path, capsys, row, activity, seconds):
     path = write(tmp_path / "a_01.csv", row)
     assert learn(path, "-o", tmp_path / "m.gait", "--activity", activity, "--json") == 0
-    told = capsys.readouterr()
-    (made,) = json.loads(told.out)["sequences"]
+    reported = capsys.readouterr()
+    (made,) = json.loads(reported.out)["sequences"]
     _, classes = simulated(row)
     assert set(classes[slice(*made["kept"])]) == {activity} and made["activity"] == activity
     assert np.divide(made["kept"], row[2]) == pytest.approx(seconds, abs=0.3)
@@ -73,7 +73,7 @@ def test_the_longest_part_of_the_activity_is_learnt_and_told(tmp_path, capsys, r
         made["kept"][0] > 0,
         made["kept"][1] < row[1],
     ]
-    (line,) = [line for line in told.err.splitlines() if str(path) in line]
+    (line,) = [line for line in reported.err.splitlines() if str(path) in line]
     start, stop = (f"{frame / row[2]:.1f}" for frame in made["kept"])
     assert line == (
         f"{path}: not one steady motion: learnt from {start} to {stop} s of {row[1] / row[2]:.1f} s"
@@ -84,11 +84,11 @@ def test_recordings_of_both_classes_give_both(tmp_path, capsys):
     for k, row in enumerate((BOTH, MORE_WALK)):
         write(tmp_path / "in" / f"a{k}_01.csv", row)
     assert learn(tmp_path / "in", "-o", tmp_path / "m.gait", "--class", "run", "--json") == 0
-    told = capsys.readouterr()
-    assert [one["name"] for one in json.loads(told.out)["classes"]] == ["walk", "run"]
-    lines = [line for line in told.err.splitlines() if "not one steady motion" in line]
+    reported = capsys.readouterr()
+    assert [one["name"] for one in json.loads(reported.out)["classes"]] == ["walk", "run"]
+    lines = [line for line in reported.err.splitlines() if "not one steady motion" in line]
     assert len(lines) == 2 and all("motion (and similar in 1 more file): learnt" in line for line in lines)
-    assert lines[0].startswith("class run: ") and "left out" not in told.err
+    assert lines[0].startswith("class run: ") and "left out" not in reported.err
 
 
 def test_a_refusal_names_what_was_found(tmp_path, capsys):
@@ -102,12 +102,12 @@ def test_a_refusal_names_what_was_found(tmp_path, capsys):
     assert found and 1.0 < float(found[1]) < 1.9 and 1.0 < float(found[2]) < 1.5
     path = write(tmp_path / "b_01.csv", BRIEF_STOP)
     assert learn(path, "-o", tmp_path / "m.gait", "--activity", "run") == 1
-    told = capsys.readouterr().err
-    assert "not learnt as 'run': 0.0 to 2.6 s of 10.0 s: this is not running: there is a foot" in told
-    assert told.endswith("leave it out, or give --activity walk\n")
+    reported = capsys.readouterr().err
+    assert "not learnt as 'run': 0.0 to 2.6 s of 10.0 s: this is not running: there is a foot" in reported
+    assert reported.endswith("leave it out, or give --activity walk\n")
 
 
-def test_a_walk_without_other_motions_is_not_told(tmp_path, capsys):
+def test_a_walk_without_other_motions_is_not_named(tmp_path, capsys):
     path = write(tmp_path / "a_01.csv", ("side", 120, 30, 3))
     assert learn(path, "-o", tmp_path / "m.gait") == 0
     assert "steady" not in capsys.readouterr().err
