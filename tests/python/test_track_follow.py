@@ -429,13 +429,20 @@ def test_trunks_that_face_the_other_way_for_half_a_second_are_ambiguous(
 
 
 def test_a_smoothed_track_is_ambiguous_for_the_second_before_too(of_sides):
-    """But not across a start."""
+    """Before a quarter of a second of mirrored trunks, but not across a start."""
     plausible, rows = of_sides(np.pi / 2, swapped(), range(24, 40))
-    for start, first in ((0, 9), (20, 20)):
+    for start, first in ((0, 1), (20, 20)):
         found = [(frame, replace(now, frame=frame.number - start)) for frame, now in rows[:40]]
         ambiguous = [now.status == TrackStatus.AMBIGUOUS for now in plausible.judged_later(found)]
         assert ambiguous == [n >= first for n in range(40)]
     assert [now.status for now in plausible.judged_later(rows[:39])] == [TrackStatus.TRACKING] * 39
+
+
+@pytest.mark.parametrize(("earlier", "first"), [((), 21), (range(2, 16, 2), 21), (range(2, 18, 2), 0)])
+def test_a_smoothed_track_is_ambiguous_as_long_as_some_trunks_are_mirrored(of_sides, earlier, first):
+    plausible, rows = of_sides(np.pi / 2, swapped(), [*earlier, *range(44, 60)])
+    ambiguous = [now.status == TrackStatus.AMBIGUOUS for now in plausible.judged_later(rows)]
+    assert ambiguous == [n >= first for n in range(60)]
 
 
 def test_what_was_before_a_start_does_not_count_after_it(of_sides):

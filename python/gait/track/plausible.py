@@ -76,7 +76,7 @@ class Plausibility:
         agree = self._keypoints.agree(frame, estimate)
         supported = not estimate.flags & Flag.UNSUPPORTED
         bound = _NOT_TURNED_S if self._turned else _TURNED_S
-        self._turned = sum(row[-1] for row in self._second) > bound
+        self._turned = self._mirrored() > bound
         if self._turned and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
             return replace(estimate, status=TrackStatus.AMBIGUOUS, reason=_TURNED)
         if estimate.status == TrackStatus.AMBIGUOUS and estimate.flags & Flag.OTHERS_FIT:
@@ -89,20 +89,23 @@ class Plausibility:
     def judged_later(self, found: Sequence[tuple[Frame, Estimate]]) -> list[Estimate]:
         """Judge the estimates of a whole track, in order.
 
-        Where the person seems to face the other way, the second before, which led to it, is `ambiguous` too.
+        Where the person seems to face the other way, the second before, which led to it, is `ambiguous` too,
+        and so are earlier seconds in which some trunks were mirrored.
         """
         self.restart()
         judged: list[Estimate] = []
+        mirrored: list[float] = []
         for frame, estimate in found:
             if estimate.frame == 0:  # a start
                 self.restart()
             judged.append(self.judged(frame, estimate))
+            mirrored.append(self._mirrored())
         turned = np.inf  # time of the next such frame
         for i in reversed(range(len(judged))):
             time, now = found[i][0].time, judged[i]
-            if now.status == TrackStatus.AMBIGUOUS and now.reason == _TURNED:
+            if now.reason == _TURNED or (np.isfinite(turned) and mirrored[i] > _NOT_TURNED_S):
                 turned = time
-            elif now.status == TrackStatus.TRACKING and turned - time <= 1.0:
+            if now.status == TrackStatus.TRACKING and turned - time <= 1.0:
                 judged[i] = replace(now, status=TrackStatus.AMBIGUOUS, reason=_TURNED)
             turned = np.inf if now.frame == 0 else turned
         return judged
@@ -117,6 +120,10 @@ class Plausibility:
         self._second.append((frame.time, *estimate.mean.pelvis[:2], *velocity, turned))
         while abs(frame.time - self._second[0][0]) > 1.0:
             self._second.popleft()
+
+    def _mirrored(self) -> float:
+        """Return the seconds of the last one in which the trunk is mirrored."""
+        return sum(row[-1] for row in self._second)
 
     def _walks(self, estimate: Estimate) -> bool:
         """Whether the stature is plausible and the last second's path agrees with strides and heading."""
