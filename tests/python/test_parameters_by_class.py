@@ -99,3 +99,18 @@ def test_strides_without_a_norm_state_why():
     page = run_page(Run("a", track, verdict_of(track), back, without_norm=reason))
     assert f"No norm, and no angles over the stride: {escape(reason)}." in page
     assert as_json(track, back, {})["strides"][0]["motion_class"] == "backwards"
+
+
+def test_the_verdict_names_a_class_other_than_the_walk_that_lasts_throughout():
+    back, run, walk = (true_track(name) for name in ("backwards", "running", "demo"))
+    assert "whole strides of class backwards, " in verdict_of(back).sentence()
+    sentence = verdict_of(run).sentence()
+    assert "whole strides of class run, " in sentence and "along the whole path" not in sentence
+    assert f'<p class="lead">{sentence}.</p>' in run_page(Run("a", run, verdict_of(run)))
+    assert set(walk.motion_class) == {"walk"} and "of class" not in verdict_of(walk).sentence()
+    short = {"frame": run.frame[:2], "time": run.time[:2], "phase": run.phase[:2]}
+    short |= {name: {k: v[:2] for k, v in getattr(run, name).items()} for name in ("places", "sd", "numbers")}
+    short = replace(run, status=run.status[:2], motion_class=run.motion_class[:2], **short)
+    assert verdict_of(short).sentence() == "Tracked 2 of 2 frames, no whole stride of class run, 2.50 m/s"
+    stand = replace(short, motion_class=["stand"] * 2, phase=np.full(2, np.nan))
+    assert verdict_of(stand).sentence() == "Tracked 2 of 2 frames, stood throughout"

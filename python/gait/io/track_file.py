@@ -36,6 +36,7 @@ STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
 CLASS_COLUMN, CLASS_PREFIX = "motion_class", "p_"
+WALKING = "walk"  # class that needs no mention
 STANDING = "stand"  # class of a person without a phase
 CLIP_COLUMNS = ("reason", "first_frame", "last_frame")
 FILM_COLUMN = "film"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait.counts import count_of
-from gait.io.track_file import STATUSES, Track
+from gait.io.track_file import STANDING, STATUSES, WALKING, Track
 from gait.motion.parameters import Parameters, measured
 
 WHICH_LEG = "the images do not show which leg is the right one"
@@ -40,7 +40,8 @@ class Verdict:
     no_strides : int
         Frames with an estimate in which the person takes no strides.
     motion_class : str
-        Class of the strides that count, if others are left out because of their class.
+        Class of the strides that count, if others are left out because of their class, or if it is not the
+        walk; without strides, the class of the whole track if it is one other than the walk.
     camera_moves : bool
         The camera moves but counts as still: a person who walks may seem to walk in place.
     along_path : bool
@@ -73,10 +74,13 @@ class Verdict:
     def sentence(self) -> str:
         """One sentence: what was tracked, how the person walked, and what is uncertain."""
         parts = [f"Tracked {self.tracked} of {count_of(self.total, 'frame')}"]
-        strides = count_of(self.strides, "whole stride") if self.strides else "no whole stride"
-        parts.append(strides + (f" of class {self.motion_class}" if self.motion_class else ""))
-        if self.speed is not None:
-            parts.append(f"{self.speed:.2f} m/s" + self._speed_words())
+        if self.motion_class == STANDING and not self.strides:
+            parts.append("stood throughout")
+        else:
+            strides = count_of(self.strides, "whole stride") if self.strides else "no whole stride"
+            parts.append(strides + (f" of class {self.motion_class}" if self.motion_class else ""))
+            if self.speed is not None:
+                parts.append(f"{self.speed:.2f} m/s" + self._speed_words())
         text = ", ".join(parts)
         if self.counts["ambiguous"]:
             what = "left and right uncertain" if set(self.why) == {WHICH_LEG} else "uncertain"
@@ -146,10 +150,19 @@ def verdict_of(
         in_place=in_place,
         no_strides=0 if np.isnan(track.phase).all() else int(np.isnan(track.phase).sum()),
         why=dict(reasons.most_common()),
-        motion_class=parameters.motion_class if parameters is not None and others else "",
+        motion_class=_class_to_name(track, parameters),
         along_path=others,
         camera_moves=camera_moves,
     )
+
+
+def _class_to_name(track: Track, parameters: Parameters | None) -> str:
+    if parameters is None:
+        classes = set(track.motion_class) - {""}
+        name, others = classes.pop() if len(classes) == 1 else "", False
+    else:
+        name, others = parameters.motion_class, parameters.others > 0
+    return name if others or name != WALKING else ""
 
 
 def _strides(parameters: Parameters) -> int:
