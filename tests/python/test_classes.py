@@ -29,6 +29,8 @@ from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.prior.level import level_components
 from gait.learn.prior.model import meta_section, origin
 from gait.motion.verdict import verdict_of
+from gait.report.drawing import class_words
+from gait.report.run_files import estimates_of
 from gait.report.run_page import Run, run_page
 from gait.simulate.clip import describe, planned_events, simulate
 from gait.simulate.scenario import PRESETS, Scenario
@@ -514,6 +516,10 @@ def test_estimates_and_track_files_have_the_classes(model: gait.Model, tmp_path:
     assert (track.numbers["speed_m_s"] == 0).all() and all(np.isfinite(one.mean.phase) for one in found)
     assert np.allclose(track.numbers["p_stand"], [one.class_probability[1] for one in found], atol=1e-4)
     assert track_file.header(2, (), ("walk",)) == track_file.header(2, ())
+    drawn = [estimates_of(track, one)[0] for one in (model, gait.Model(SHIPPED))]
+    assert [one.mean.motion_class for one in drawn] == [1, 0] and drawn[0].mean.phase == 0
+    assert {class_words(one) for one in (*drawn, found[0])} == {class_words(found[0])} != {""}
+    assert not any(one.takes_strides for one in drawn)
     page = run_page(Run("classes", track, verdict_of(track)))
     assert "Probability of each class of motion" in page and "backwards" in page
 

@@ -111,6 +111,17 @@ def test_the_class_has_a_line_in_the_picture_if_there_are_several(log, monkeypat
     assert rows[0] < panel[0] < rows[-1] <= panel[1]
 
 
+def test_a_person_who_stands_has_a_class_but_no_hand_arc_or_cadence(log, monkeypatch):
+    written = []
+    monkeypatch.setattr(drawing, "_write", lambda region, words, *style: written.append(words))
+    overlay, walks, stands = Overlay(rig.model(), rig.CAMERA), log[1][0], log[1][5]
+    for estimate in (walks, stands):
+        overlay.draw(rig.picture(0), estimate_of(estimate, classes_at(0)), 0)
+    walking, standing = written[: len(written) // 2 + 1], written[len(written) // 2 + 1 :]
+    assert {"R", "L"} < set(walking) and walking[-2] == standing[-2] == "run 88 %"
+    assert standing[1:3] == ["no strides", " 0.00 m/s"] and len(standing) == 5
+
+
 @pytest.mark.parametrize(
     "width, height, beside", [(720, 1280, True), (320, 240, True), (1280, 720, True), (240, 320, False)]
 )

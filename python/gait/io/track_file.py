@@ -276,6 +276,12 @@ class Track(Joints):
     #: `Video.digest` of the film that was tracked; empty if not stated.
     film: str = ""
 
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """Names of the classes of motion of the model that tracked; empty if it has only one."""
+        columns = [name for name in self.numbers if name.startswith(CLASS_PREFIX)]
+        return tuple(name.removeprefix(CLASS_PREFIX) for name in columns) if self.motion_class else ()
+
     def eval15_sd(self) -> Array:
         """Return the standard deviations of EVAL15, shape (n, 15, 3)."""
         return np.stack([self.sd[name] for name in EVAL15], axis=1)

@@ -52,11 +52,10 @@ def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> N
 
 
 def _figures(estimate: Estimate) -> tuple[str, ...]:
-    if np.isnan(estimate.mean.phase):
-        return "no strides", ""
-    steps = 120 * estimate.mean.stride_hz if estimate.takes_strides else 0.0
+    steps = f"{120 * estimate.mean.stride_hz:5.1f} steps/min" if estimate.takes_strides else "no strides"
+    speed = "" if np.isnan(estimate.speed) else f"{estimate.speed:5.2f} m/s"
     of_class = class_words(estimate)
-    return (f"{steps:5.1f} steps/min", f"{estimate.speed:5.2f} m/s", *([of_class] if of_class else []))
+    return (steps, speed, *([of_class] if of_class else []))
 
 
 def class_words(estimate: Estimate) -> str:
@@ -111,11 +110,11 @@ def _draw_legend(canvas: Image, scale: float) -> None:
 def _dial(region: Image, estimate: Estimate, at: tuple[int, int], radius: float, scale: float) -> None:
     """Draw the stride as a clock face: right heel strike at the top, a hand, and two standard deviations.
 
-    Without a phase there is no hand.
+    While the person takes no strides there is no hand.
     """
     thin, r = max(1, round(scale)), round(radius)
     cv2.circle(region, at, r, _DIM, thin, cv2.LINE_AA)
-    if np.isnan(estimate.mean.phase):
+    if not estimate.takes_strides:
         return
     turn, spread = 360 * estimate.mean.phase, min(2 * 360 * estimate.sd.phase, 180.0)
     colour = _STATUS[estimate.status]

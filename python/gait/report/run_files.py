@@ -16,7 +16,7 @@ from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.files import is_unfinished, replacing
-from gait.io.track_file import Track, read_track
+from gait.io.track_file import CLASS_PREFIX, WALKING, Track, read_track
 from gait.io.video import Video
 from gait.motion.evaluate import Measures
 from gait.motion.footfalls import Draws
@@ -147,13 +147,19 @@ def estimates_of(track: Track, model: Model) -> dict[int, Estimate]:
 
     found = {}
     for k, number in enumerate(track.frame.tolist()):
+        motion_class, probability = WALKING, np.ones(1)
+        if track.motion_class and track.motion_class[k]:
+            motion_class = track.motion_class[k]
+            probability = np.array([column(f"{CLASS_PREFIX}{name}", k) for name in track.classes])
+        still = model.directions.get(motion_class) == 0  # one posture, whatever the phase
         mean = State(
-            phase=float(track.phase[k]),
+            phase=0.0 if still else float(track.phase[k]),
             stride_hz=column("stride_hz", k),
             stature=column("stature_m", k),
             heading=column("heading_rad", k),
             pelvis=track.places["pelvis"][k],
             coef=np.array([column(f"c_{c + 1}", k) for c in range(components)]),
+            motion_class=model.classes.index(motion_class) if motion_class in model.classes else 0,
         )
         found[number] = Estimate(
             utime=round(1e6 * float(track.time[k])),
@@ -172,6 +178,8 @@ def estimates_of(track: Track, model: Model) -> dict[int, Estimate]:
             joint_sd=sd[k, order],
             angles=np.zeros(0),
             joint_names=model.joint_names,
+            motion_class=motion_class,
+            class_probability=probability,
         )
     return found
 
