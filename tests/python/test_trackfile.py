@@ -221,6 +221,39 @@ def test_damaged_tracks_are_reported(change, words, tmp_path):
         read_track(tmp_path / "t.csv")
 
 
+def with_classes(path, names, *rows):
+    """Write a track with the columns of motion classes, given the cells of each row."""
+    write(path, len(rows))
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(f"{a},{b}" for a, b in zip(lines, (names, *rows), strict=True)) + "\n")
+    return path
+
+
+def test_classes_of_motion_are_read_with_their_probabilities(tmp_path):
+    rows = "stand,0.3333,0.6666", ",,", "walk,1.0000,0.0000"
+    track = read_track(with_classes(tmp_path / "t.csv", "motion_class,p_walk,p_stand", *rows))
+    assert track.classes == ("walk", "stand") and track.motion_class == ["stand", "", "walk"]
+    np.testing.assert_array_equal(track.numbers["p_walk"], [0.3333, np.nan, 1])
+
+
+@pytest.mark.parametrize(
+    ("names", "row", "words"),
+    [
+        ("motion_class", "walk", "column motion_class needs a column p_<class> for each class; give the"),
+        ("motion_class,p_walk,p_stand", "fly,0.5,0.5", "line 3: motion_class 'fly' is not one of walk stand"),
+        ("motion_class,p_walk,p_stand", "walk,7,0", "line 3: p_walk is '7'; give a probability, from 0 to 1"),
+        ("motion_class,p_walk,p_stand", "walk,1,-0.1", "line 3: p_stand is '-0.1'; give a probability"),
+        ("motion_class,p_walk,p_stand", "walk,0.8,0.4", r"line 3: p_walk \+ p_stand is 1.2; give prob"),
+        ("motion_class,p_walk,p_stand", "walk,1,", "line 3: of motion_class p_walk p_stand some are empty;"),
+        ("motion_class,p_walk,p_stand", ",1,0", "line 3: of motion_class p_walk p_stand some are empty;"),
+    ],
+)
+def test_classes_of_motion_that_cannot_be_are_named(names, row, words, tmp_path):
+    good = "walk" if names == "motion_class" else "walk,1,0"
+    with pytest.raises(UserError, match=f"t.csv: {words}"):
+        read_track(with_classes(tmp_path / "t.csv", names, good, row))
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

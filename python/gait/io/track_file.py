@@ -53,6 +53,8 @@ _UNBOUNDED = ("frame", "time", "ess", "log_evidence", *CLIP_COLUMNS, PERSON_COLU
 LARGEST = 1e6
 """Largest magnitude of other numbers in a track, in metres or another unit."""
 _NOT_NEGATIVE = re.compile(r"stature_m|ess|.*_sd(_rad|_m)?|.*_s[xyz]")
+_PROBABILITY = re.compile(rf"{CLASS_PREFIX}.*|class_probability")
+_ROUNDED = 0.01  # most by which the probabilities of a row may differ from a sum of 1
 
 
 def fault_in(column: str, values: npt.ArrayLike) -> tuple[int, str] | None:
@@ -63,10 +65,12 @@ def fault_in(column: str, values: npt.ArrayLike) -> tuple[int, str] | None:
     numbers = np.asarray(values, float)
     most = np.inf if column in _UNBOUNDED else LARGEST
     negative = (numbers < 0) & (_NOT_NEGATIVE.fullmatch(column) is not None)
+    share = (numbers < 0) | (numbers > 1 + 1e-6)  # by single precision, slightly more than 1
     for wrong, remedy in (
         (~np.isfinite(numbers), "give a finite number"),
         (np.abs(numbers) > most, f"give a number of at most {most:g}"),
         (negative, "give 0 or more"),
+        (share & (_PROBABILITY.fullmatch(column) is not None), "give a probability, from 0 to 1"),
     ):
         if wrong.any():
             return int(wrong.argmax()), remedy
@@ -368,12 +372,35 @@ def _track(table: _Table, status: list[str], phase: Array) -> Track:
         phase=phase,
         sd={name: table.vectors(name, ("sx", "sy", "sz")) for name in JOINTS},
         numbers={name: table.numbers(name) for name in table.rows if _is_number(name)},
-        motion_class=table.column(CLASS_COLUMN) if CLASS_COLUMN in table.rows else [],
+        motion_class=_motion_class(table) if CLASS_COLUMN in table.rows else [],
         frames=_frames(table) if set(CLIP_COLUMNS) <= table.rows.keys() else None,
         reason=table.column("reason") if "reason" in table.rows else [],
         camera_change=_camera_change(table) if set(CAMERA_COLUMNS) <= table.rows.keys() else None,
         film=table.column(FILM_COLUMN)[0] if FILM_COLUMN in table.rows else "",
     )
+
+
+def _motion_class(table: _Table) -> list[str]:
+    """Read the class of motion of each frame, which must be one of those that have probabilities."""
+    found, columns = table.column(CLASS_COLUMN), [c for c in table.rows if c.startswith(CLASS_PREFIX)]
+    if not columns:
+        remedy = f"give the track as it was written, or remove {CLASS_COLUMN}"
+        raise UserError(
+            f"{table.path}: column {CLASS_COLUMN} needs a column {CLASS_PREFIX}<class> for each class; {remedy}"
+        )
+    shares = np.stack([table.numbers(column) for column in columns], axis=1)
+    classes = [column.removeprefix(CLASS_PREFIX) for column in columns]
+    for line, (name, share) in enumerate(zip(found, shares, strict=True), 2):
+        fault, given = "", np.isfinite(share)
+        if name and name not in classes:
+            fault = f"{CLASS_COLUMN} {name!r} is not one of {' '.join(classes)}"
+        elif {bool(name)} != set(given.tolist()):
+            fault = f"of {CLASS_COLUMN} {' '.join(columns)} some are empty; give all or none"
+        elif name and abs(share.sum() - 1) > _ROUNDED:
+            fault = f"{' + '.join(columns)} is {share.sum():g}; give probabilities that sum to 1"
+        if fault:
+            raise UserError(f"{table.path}: line {line}: {fault}")
+    return found
 
 
 def _frames(table: _Table) -> range:
