@@ -1,15 +1,18 @@
 """Gait parameters and norms of people who run, become faster or walk backwards, by class of motion."""
 
+import re
 from dataclasses import replace
 from functools import cache
 from html import escape
 
 import numpy as np
 import pytest
+from walking_track import walking_track, write_track
 
 from gait.bindings.model import read_cyclic
 from gait.body.motion_classes import class_names
 from gait.body.skeleton import JOINTS
+from gait.cli import main
 from gait.io.track_file import Track
 from gait.motion.norms import beside_norms
 from gait.motion.parameters import as_json, measure, norm_model, stride_rows, without_norm
@@ -32,7 +35,7 @@ def true_track(preset: str, frames: int = 180) -> Track:
     numbers |= {"phase": phase, "phase_sd": np.full(n, 0.01), "stature_m": np.full(n, 1.75)}
     numbers |= {"stride_hz": np.gradient(timing.phase[at]) * 30, "stature_sd_m": np.full(n, 0.01)}
     numbers |= {"speed_m_s": stage.walk.speed[at]}
-    numbers |= {f"p_{name}": np.array(stage.classes) == name for name in class_names(CLASSES)}
+    numbers |= {f"p_{name}": 1.0 * (np.array(stage.classes) == name) for name in class_names(CLASSES)}
     numbers |= {"heading_rad": stage.walk.heading[at], "r_knee_flexion_deg": np.zeros(n)}
     return Track(
         frame=np.arange(n),
@@ -114,3 +117,30 @@ def test_the_verdict_names_a_class_other_than_the_walk_that_lasts_throughout():
     assert verdict_of(short).sentence() == "Tracked 2 of 2 frames, no whole stride of class run, 2.50 m/s"
     stand = replace(short, motion_class=["stand"] * 2, phase=np.full(2, np.nan))
     assert verdict_of(stand).sentence() == "Tracked 2 of 2 frames, stood throughout"
+
+
+def test_the_norm_is_that_of_the_model_that_tracked(tmp_path, capsys):
+    """Without -m: of a track of the shipped classes these, of one without classes the walk."""
+    runs, walks = true_track("running"), walking_track()
+    write_track(tmp_path / "runs.csv", runs, classes=runs.classes)
+    write_track(tmp_path / "walks.csv", walks)
+    found = {}
+    for words in (["runs.csv"], ["runs.csv", "-m", "classes"], ["walks.csv"], ["runs.csv", "-m", "walk"]):
+        words = [str(tmp_path / words[0]), *words[1:]]
+        assert main(["report", "track", *words, "-o", str(tmp_path / "out")]) == 0
+        page = re.findall(
+            "Norm: the people of the model (.*?)[.]<", (tmp_path / "out/report.html").read_text()
+        )
+        found[" ".join(words[0].rsplit("/", 1)[-1:] + words[1:])] = capsys.readouterr().out, page
+    assert found["runs.csv"] == found["runs.csv -m classes"]
+    assert "\nnorm: the people of the model classes, class run\n" in found["runs.csv"][0]
+    assert found["runs.csv"][1] == ["classes, class run"] and found["walks.csv"][1] == ["walk"]
+    assert "no norm: the model has no class run" in found["runs.csv -m walk"][0]
+    assert found["runs.csv -m walk"][1] == []
+    limps = replace(runs, numbers=runs.numbers | {"p_limp": np.zeros(len(runs.frame))})
+    write_track(tmp_path / "limps.csv", limps, classes=limps.classes)
+    assert main(["report", "track", str(tmp_path / "limps.csv")]) == 1
+    error = capsys.readouterr().err
+    assert "limps.csv: was tracked with the classes walk stand backwards run limp, which no model of" in error
+    assert error.endswith("give the model that was tracked with, -m MODEL\n") and error.count("\n") == 1
+    assert not (tmp_path / "limps_gait").exists()

@@ -56,13 +56,15 @@ def walking_track(seconds=5.0, hz=0.9, length=1.3, width=0.12, heading=0.4, sd=0
     )
 
 
-def write_track(path, track, angles=("r_hip_flexion", "l_hip_flexion", "torso_x")):
+def write_track(path, track, angles=("r_hip_flexion", "l_hip_flexion", "torso_x"), classes=()):
     """Put a track into a file of the contract's columns."""
     columns = {"frame": track.frame, "time": track.time, "status": track.status} | track.numbers
     for name, place in track.places.items():
         for k, axis in enumerate("xyz"):
             columns[f"{name}_{axis}"], columns[f"{name}_s{axis}"] = place[:, k], track.sd[name][:, k]
-    names = header(5, angles)
+    if classes:
+        columns["motion_class"] = track.motion_class
+    names = header(5, angles, classes)
     with open(path, "w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow(names)

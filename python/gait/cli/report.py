@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--truth", metavar="TRUTH.csv", help="true motion, to report errors against")
     add("--draws", metavar="D.npz", help="motions from gait track --smooth --draws")
-    values.add_model(parser, "model that was tracked")
+    values.add_model(parser, "model that was tracked", values.TRACKED)
     values.add_norms(parser)
     add("--replayed", action="store_true", help="with a log: not tracked live, show no latency")
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 EXAMPLES = """\
 examples:
   gait report track track.csv -o gait_report
+  gait report track track.csv -m my.gait -o gait_report
   gait report track track.csv --draws draws.npz -o gait_report
 """
 
@@ -36,7 +37,7 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("track", metavar="OUT.csv", help="from gait track or gait record")
-    values.add_model(parser, "model with the norm")
+    values.add_model(parser, "model with the norm", values.TRACKED)
     parser.add_argument(
         "-o", "--output", metavar="DIR", help="folder for the page and tables (default: OUT_gait)"
     )
@@ -51,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
     from gait.motion.footfalls import Draws
     from gait.motion.norms import beside_norms
     from gait.motion.parameters import as_json, measure, without_norm, write_tables
+    from gait.motion.tracked_model import model_for
     from gait.motion.verdict import verdict_of
     from gait.report.run_page import Run, cycles_of, run_page
 
@@ -64,33 +66,35 @@ def run(args: argparse.Namespace) -> int:
         parameters = measure(track, draws)
     except UserError as exc:
         raise UserError(f"{args.track}: {exc}") from None
-    model = read_cyclic(args.model)
+    name = model_for(track, args.track, args.model)
+    model = read_cyclic(name)
     cycles = cycles_of(track, parameters, model, draws)
     norms = beside_norms(track, parameters, model, args.age, args.sex)
     verdict, reason = verdict_of(track, parameters=parameters), without_norm(parameters, model)
-    found = as_json(track, parameters, cycles) | {"norms": [norm.as_json() for norm in norms]}
+    found = as_json(track, parameters, cycles)
+    found |= {"model": name, "norms": [norm.as_json() for norm in norms]}
     with filling(output) as folder:
         write_tables(folder, found, parameters, cycles)
-        page = run_page(Run(source.name, track, verdict, parameters, cycles, norms, reason))
+        page = run_page(Run(source.name, track, verdict, parameters, cycles, norms, reason, name))
         (folder / "report.html").write_text(page, encoding="utf-8")
     print(
         json.dumps(found, allow_nan=False)
         if args.json
-        else f"{verdict.sentence()}.\n{_text(parameters, norms, reason)}"
+        else f"{verdict.sentence()}.\n{_text(parameters, norms, reason, name)}"
     )
     return 0
 
 
-def _text(parameters: Parameters, norms: Sequence[Compared], without: str) -> str:
+def _text(parameters: Parameters, norms: Sequence[Compared], without: str, model: str) -> str:
     """Format tables for the terminal."""
-    from gait.report.gait_parts import NORM_HEAD, PARAMETER_HEADER, norm_rows, parameter_rows
+    from gait.report.gait_parts import NORM_HEAD, PARAMETER_HEADER, norm_people, norm_rows, parameter_rows
 
     notes = f"mean ± its standard deviation (between strides) over {parameters.counted()}; uncertainty from "
     notes += parameters.source
     lines = [*_table([list(PARAMETER_HEADER), *parameter_rows(parameters)]), notes]
     lines += [parameters.warning()] * bool(parameters.warning())
     if norms:
-        lines += ["", *_table([list(NORM_HEAD), *norm_rows(norms)])]
+        lines += ["", *_table([list(NORM_HEAD), *norm_rows(norms)]), norm_people(model, parameters)]
     lines += [f"no norm: {without}"] * bool(without)
     return "\n".join(lines)
 

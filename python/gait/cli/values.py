@@ -206,14 +206,19 @@ def require_age(age: float | None, sex: str | None) -> None:
         raise UsageError("--sex: needs --age")
 
 
-def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
-    """Add ``--model``; None means the package's model."""
+TRACKED = "default: the one with the track's classes of motion"
+"""Default of ``--model`` of commands that report a track."""
+
+
+def add_model(
+    parser: ArgumentParser, what: str = "walking model", default: str = "default: walk; in paper mode paper"
+) -> None:
+    """Add ``--model``; None means the package's model, or what `default` describes for the help."""
     parser.add_argument(
         "-m",
         "--model",
         metavar="M.gait",
-        help=f"{what}: a file, or a model of the package: walk (default; in paper mode paper), paper or "
-        "classes",
+        help=f"{what}: a file, or a model of the package: walk, paper or classes ({default})",
     )
 
 

@@ -384,9 +384,9 @@ def _motion_class(table: _Table) -> list[str]:
     """Read the class of motion of each frame, which must be one of those that have probabilities."""
     found, columns = table.column(CLASS_COLUMN), [c for c in table.rows if c.startswith(CLASS_PREFIX)]
     if not columns:
-        remedy = f"give the track as it was written, or remove {CLASS_COLUMN}"
         raise UserError(
-            f"{table.path}: column {CLASS_COLUMN} needs a column {CLASS_PREFIX}<class> for each class; {remedy}"
+            f"{table.path}: column {CLASS_COLUMN} needs a column {CLASS_PREFIX}<class> for each class; give "
+            f"the track as it was written, or remove {CLASS_COLUMN}"
         )
     shares = np.stack([table.numbers(column) for column in columns], axis=1)
     classes = [column.removeprefix(CLASS_PREFIX) for column in columns]

@@ -22,6 +22,7 @@ from gait.motion.evaluate import Measures
 from gait.motion.footfalls import Draws
 from gait.motion.norms import beside_norms
 from gait.motion.parameters import measured, without_norm
+from gait.motion.tracked_model import model_for
 from gait.motion.verdict import Verdict, verdict_of
 from gait.progress import note, progress
 from gait.report.camera_facts import camera_facts
@@ -48,7 +49,7 @@ class RunFiles:
     truth, draws : str, optional
         True motion; motions of ``gait track --smooth --draws``.
     model : str, optional
-        By default the package's model.
+        By default the model of the package that has the track's classes of motion.
     age, sex : optional
         Age of the person in years, and ``f`` or ``m``, for the norm of the speed.
     quiet : bool
@@ -90,7 +91,9 @@ def write_report(
     UserError
         If a file cannot be read or written, or the track has frames that the clip does not have.
     """
-    video, model, track = Video(files.video), Model(files.model), read_track(files.track)
+    video, track = Video(files.video), read_track(files.track)
+    tracked = model_for(track, files.track, files.model)
+    model = Model(tracked)
     if track.frame[-1] >= video.count:
         raise UserError(
             f"{files.track}: has frame {track.frame[-1]}, {files.video} ends at {video.count - 1}; give the "
@@ -106,7 +109,7 @@ def write_report(
     errors = compare(track, files.truth, files.model, camera) if files.truth else None
     note(remark, files.quiet or not remark)
     parameters = measured(track, draws)
-    sections = read_cyclic(files.model)
+    sections = read_cyclic(tracked)
     norms = [] if parameters is None else beside_norms(track, parameters, sections, files.age, files.sex)
     overlay = None if camera is None else Overlay(model, camera)
     frames = range(video.count) if track.frames is None else track.frames
@@ -119,6 +122,7 @@ def write_report(
         cycles=cycles_of(track, parameters, sections, draws),
         norms=norms,
         without_norm="" if parameters is None else without_norm(parameters, sections),
+        model=tracked,
         film=film,
         times=video.times[film.frames.start : film.frames.stop],
         camera=camera,

@@ -23,7 +23,7 @@ from gait.report import terms
 from gait.report.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE
 from gait.report.comparison import Comparison, add_errors
 from gait.report.film import PageFilm, runs
-from gait.report.gait_parts import add_gait, add_norms, time_span, tint
+from gait.report.gait_parts import add_gait, add_norms, norm_people, time_span, tint
 from gait.report.page import Page
 from gait.report.plots import for_screen_and_telephone, time_plot
 from gait.web import modules, parts
@@ -57,6 +57,8 @@ class Run:
         Parameters compared with norms.
     without_norm : str
         Why there is no norm, nor angles over the stride.
+    model : str or None
+        The model whose people are the norm; None: the package's.
     film : PageFilm or None
     times : ndarray of shape (frames of the film,)
         Seconds; empty without a film.
@@ -78,6 +80,7 @@ class Run:
     cycles: Mapping[str, AngleCycle] = field(default_factory=dict)
     norms: Sequence[Compared] = ()
     without_norm: str = ""
+    model: str | None = None
     film: PageFilm | None = None
     times: Array = field(default_factory=lambda: np.zeros(0))
     camera: Camera | None = None
@@ -114,6 +117,9 @@ def run_page(run: Run) -> str:
         add_norms(page, run.norms)
         if run.without_norm:
             page.words(f"No norm, and no angles over the stride: {run.without_norm}.", "faint")
+        elif run.norms or run.cycles:
+            people = norm_people(run.model, run.parameters)
+            page.words(f"{people[0].upper()}{people[1:]}.", "faint")
     if run.film is not None and modules.available():
         drawing = '<h2>Angles over time</h2><div id="run-curves"></div>'
         page.html(f'<section class="screen-only">{drawing}</section>')

@@ -66,6 +66,7 @@ class RunReport:
             cycles=cycles_of(track, found, sections, self._draws),
             norms=[] if found is None else beside_norms(track, found, sections),
             without_norm="" if found is None else without_norm(found, sections),
+            model=options.model,
             film=film,
             times=scene.video.times[film.frames.start : film.frames.stop],
             camera=scene.camera,
