@@ -475,19 +475,13 @@ def test_the_first_class_needs_a_name_that_fits_too(
     assert "--activity '" in error and ": the name " in error and error.count("\n") == 1
 
 
+AHEAD = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+CAMERA = gait.Camera(64, 48, 60, 60, 31.5, 23.5, AHEAD, np.array([0, 1, 4.0]))
+
+
 def estimates(model: gait.Model) -> list[Estimate]:
     """A small clip of a person who stands."""
-    camera = gait.Camera(
-        64,
-        48,
-        60,
-        60,
-        31.5,
-        23.5,
-        np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
-        np.array([0, 1, 4.0]),
-    )
-    tracker = gait.Tracker(model, camera, gait.TrackerConfig.default(particles=64, seed=1))
+    tracker = gait.Tracker(model, CAMERA, gait.TrackerConfig.default(particles=64, seed=1))
     mean, sd = model.prior()
     mean.motion_class, mean.phase = 1, 0.3
     sd.phase = sd.heading = 0.05
@@ -517,7 +511,7 @@ def test_estimates_and_track_files_have_the_classes(model: gait.Model, tmp_path:
     assert np.allclose(track.numbers["p_stand"], [one.class_probability[1] for one in found], atol=1e-4)
     assert track_file.header(2, (), ("walk",)) == track_file.header(2, ())
     drawn = [estimates_of(track, one)[0] for one in (model, gait.Model(SHIPPED))]
-    assert [one.mean.motion_class for one in drawn] == [1, 0] and drawn[0].mean.phase == 0
+    assert [one.mean.motion_class for one in drawn] == [1, 0] and model.render(CAMERA, drawn[0].mean).any()
     assert {class_words(one) for one in (*drawn, found[0])} == {class_words(found[0])} != {""}
     assert not any(one.takes_strides for one in drawn)
     page = run_page(Run("classes", track, verdict_of(track)))

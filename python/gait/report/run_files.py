@@ -155,10 +155,10 @@ def estimates_of(track: Track, model: Model) -> dict[int, Estimate]:
         if track.motion_class and track.motion_class[k]:
             motion_class = track.motion_class[k]
             probability = np.array([column(f"{CLASS_PREFIX}{name}", k) for name in track.classes])
-        still = model.directions.get(motion_class) == 0  # one posture, whatever the phase
+        still = model.directions.get(motion_class) == 0  # one posture, whatever phase and rate
         mean = State(
             phase=0.0 if still else float(track.phase[k]),
-            stride_hz=column("stride_hz", k),
+            stride_hz=0.0 if still else column("stride_hz", k),
             stature=column("stature_m", k),
             heading=column("heading_rad", k),
             pelvis=track.places["pelvis"][k],
