@@ -60,6 +60,16 @@ def test_columns_that_are_not_there_are_missing(tmp_path):
     assert np.isnan(table.angles[:, ~visible]).all()
 
 
+def test_a_position_is_no_speed(tmp_path):
+    """A walk at 0.8 statures per stride whose position is given instead of its speed."""
+    path = write(tmp_path / "a.csv", extra={"root_forward": 3 * np.arange(240) / 100})
+    with pytest.raises(UserError, match=r"a.csv: root_forward reaches 6\.5 statures .* like a position"):
+        readers.read(path)
+    sprint = np.full(240, 2.6)
+    sprint[:20] = 9.0  # errors of recording
+    assert readers.read(write(tmp_path / "a.csv", extra={"root_forward": sprint})).root is not None
+
+
 def test_root_channels_and_stature(tmp_path):
     extra = {"root_forward": np.full(240, 0.8), "root_pitch_deg": np.full(240, 3.0), "stature_m": [1.7] * 240}
     table = readers.read(write(tmp_path / "a.csv", extra=extra))

@@ -52,6 +52,8 @@ LEG_ANGLES = [f"{s}_{joint}_flexion" for s in SIDES for joint in ("hip", "knee")
 LEAST_RANGE = 4.0  # degrees; a smaller range is probably radians in a column of degrees
 MOST_RANGE = 361.0  # degrees; no leg rotates further
 FARTHEST_ROOT = 100.0  # statures
+MOST_STRIDE_LENGTH = 4.0  # statures; sprinters, whose strides are the longest, cover 2.6
+FAST_SHARE = 10.0  # percent of the time in which `root_forward` may exceed it, as by errors of recording
 PLAUSIBLE_STATURE_M = 0.5, 2.5  # metres
 ROOT_LENGTHS = ("root_forward", "root_sway", "root_height")
 
@@ -160,6 +162,7 @@ def read_angles(path: Path, fps: float | None = None, zeros_missing: bool = Fals
             require_range(path, name, column, FARTHEST_ROOT, "statures")
         else:
             require_range(path, name, np.degrees(column), DEGREES, "degrees")
+    _require_speed(path, values.get("root_forward", np.zeros(1)))
     _require_plausible(path, columns, values)
     empty = next((name for name in LEG_ANGLES if not np.isfinite(values[name]).any()), None)
     if empty is not None:
@@ -180,6 +183,16 @@ def read_angles(path: Path, fps: float | None = None, zeros_missing: bool = Fals
         float(np.nanmedian(stature)) if np.isfinite(stature).any() else None,
         FileNotes(zeros=zeros),
     )
+
+
+def _require_speed(path: Path, forward: Floats) -> None:
+    """Raise UserError if `root_forward`, in statures per stride, is beyond what people do."""
+    speed = np.abs(forward[np.isfinite(forward)])
+    if len(speed) and (fast := float(np.percentile(speed, 100 - FAST_SHARE))) > MOST_STRIDE_LENGTH:
+        raise UserError(
+            f"{path}: root_forward reaches {fast:.1f} statures per stride (at most {MOST_STRIDE_LENGTH:g}) "
+            "and looks like a position; give the speed, in statures per stride, or remove the column"
+        )
 
 
 def _require_plausible(path: Path, columns: dict[str, list[str]], values: dict[str, Floats]) -> None:
