@@ -353,10 +353,30 @@ def test_render_a_sheet(tmp_path):
         assert (np.ptp(part, axis=2) > 40).mean() > 0.005  # something coloured in every row
 
 
+def test_render_a_class(tmp_path):
+    """A run bends the knees more than a walk; who stands is the same at all phases."""
+    drawn = {}
+    for name in ("walk", "run", "stand"):
+        out = tmp_path / f"{name}.png"
+        assert main(["render", "-m", "classes", "--class", name, "--strip", "-o", str(out)]) == 0
+        drawn[name] = cv2.imread(str(out)).astype(int)
+    assert drawn["run"].shape == drawn["walk"].shape and (drawn["run"] != drawn["walk"]).mean() > 0.02
+    first, later = (drawn["stand"][44:344, left : left + 176] for left in (120, 120 + 3 * 176))
+    assert np.array_equal(first, later)
+    poses = [tmp_path / f"{name}.bmp" for name in ("first", "run")]
+    for out, more in zip(poses, ([], ["--class", "run"]), strict=True):
+        assert main(["render", "-m", "classes", "--phase", "0.3", "-o", str(out), *more]) == 0
+    assert poses[0].read_bytes() != poses[1].read_bytes()
+
+
 @pytest.mark.parametrize(
     "words, message",
     [
         (["--strip", "--camera", "c.json"], "--camera: --strip has its own view"),
+        (
+            ["-m", "classes", "--class", "fly"],
+            "--class fly: the model has no such class; give one of walk, st",
+        ),
         (["--state", "{}"], "no such state file"),
     ],
 )

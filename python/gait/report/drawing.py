@@ -370,13 +370,13 @@ def draw_standing(model: Model, state: State, camera: Camera) -> Image:
     return Overlay(model, camera).figure(canvas, state)
 
 
-def draw_sheet(model: Model) -> Image:
-    """Draw the sheet of a model.
+def draw_sheet(model: Model, motion_class: int = 0) -> Image:
+    """Draw the sheet of one class of a model.
 
     Columns are phases.  Rows are the mean, then the stride rate (if the mean depends on it) and each score,
     at -2, 0 and +2 standard deviations.
     """
-    rows = _rows(model)
+    rows = _rows(model, motion_class)
     left, top = _MARGIN
     width, height = _CELL
     sheet = np.full((top + height * len(rows), left + width * _PHASES, 3), _PAPER, np.uint8)
@@ -396,10 +396,10 @@ def draw_sheet(model: Model) -> Image:
     return sheet
 
 
-def _rows(model: Model) -> dict[str, list[State]]:
+def _rows(model: Model, motion_class: int) -> dict[str, list[State]]:
     """Make the states of each row, by name: at 0, -2 and +2 standard deviations, or only the mean."""
-    info, turns = model.info, (0.0, -2.0, 2.0)
-    mean = State(stride_hz=info.stride_hz, coef=np.zeros(info.components))
+    info, turns = model.class_info(motion_class), (0.0, -2.0, 2.0)
+    mean = State(stride_hz=info.stride_hz, coef=np.zeros(info.components), motion_class=motion_class)
     rows = {"mean": [mean]}
     rates = [replace(mean, stride_hz=info.stride_hz + turn * info.stride_hz_sd) for turn in turns]
     if not np.array_equal(model.pose(rates[1])[1], model.pose(mean)[1]):
