@@ -421,7 +421,7 @@ def test_the_command_states_from_where_the_picture_is(
     [
         (["--frames", "1"], "--frames 1"),
         (["--size", "161x120"], "--size 161x120"),
-        (["--speed", "2.4", "--stride-hz", "0.5"], "--speed 2.4"),
+        (["--speed", "2.4", "--stride-hz", "0.5"], ": speed 2.40 m/s: at 0.50 strides/s and"),
         (["--view", "toward", "--distance", "2"], "--distance 2"),
         (["--gait", "nowhere.gait"], "nowhere.gait"),
         (["--noise", "-1"], "--noise -1"),

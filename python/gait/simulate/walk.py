@@ -522,8 +522,8 @@ def _stride_gain(angles: dict[str, Array], timing: Timing, body: Anatomy, speed:
         cadence = float(np.gradient(timing.phase, timing.step).mean())
         slow, fast = excess(low) + speed, excess(high) + speed
         raise UsageError(
-            f"--speed {speed:g}: at {cadence:.2f} strides/s and this stature the speed must be {slow:.2f} to "
-            f"{fast:.2f} m/s; change --speed or --stride-hz"
+            f"speed {speed:.2f} m/s: at {cadence:.2f} strides/s and this stature it must be {slow:.2f} to "
+            f"{fast:.2f} m/s; give another --speed or --stride-hz"
         )
     return float(brentq(excess, low, high, xtol=1e-4))
 

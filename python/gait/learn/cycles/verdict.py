@@ -88,8 +88,14 @@ class Verdict:
 
     @property
     def reason(self) -> str:
-        """Why the recording is not accepted; '' if it is."""
-        return "; ".join(str(e) for e in self.evidence if not e.accepted)
+        """Why the recording is not accepted, what the reasons have in common once; '' if it is."""
+        reasons = list[str]()
+        for e in self.evidence:
+            if not e.accepted:
+                what, colon, why = str(e).partition(": ")
+                stated = colon and any(reason.startswith(what + colon) for reason in reasons)
+                reasons.append(why if stated else str(e))
+        return "; ".join(reasons)
 
 
 def judge(
