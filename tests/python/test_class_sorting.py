@@ -42,7 +42,9 @@ def test_files_learnt_as_another_class_are_not_reported_as_left_out(
         ),
     }
 
-    def learnt(options, note, complete=lambda sections: sections, left_out=lambda line: line, only=()):
+    def learnt(
+        options, note, complete=lambda sections: sections, left_out=lambda line: line, only=(), metas=None
+    ):
         found = map(left_out, lines[options.activity])
         reported[options.activity] = [line for line in found if line]
         blob.write(options.output, complete(blob.read(SHIPPED)))
@@ -62,7 +64,9 @@ def test_files_learnt_as_another_class_are_not_reported_as_left_out(
 def test_walks_backwards_have_the_static_trials_of_their_people(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def learnt(options, note, complete=lambda sections: sections, left_out=lambda line: line, only=()):
+    def learnt(
+        options, note, complete=lambda sections: sections, left_out=lambda line: line, only=(), metas=None
+    ):
         asked.append((options.reverse, options.static, only))
         line = "in/anna_2.trc: not learnt as 'walk': ...; or give --class backwards=FOLDER"
         assert left_out(line) == (line if options.reverse else "")
@@ -105,7 +109,7 @@ def test_a_mixed_folder_is_sorted_into_classes(tmp_path: Path, capsys: pytest.Ca
     assert main(words) == 0
     noted, sorted_out = capsys.readouterr().err, blob.read(out)
     assert "--class backwards: recorded: 2 recordings" in noted
-    assert "--class stand: recorded: 1 recording\n" in noted
+    assert f"--class stand: recorded: 1 recording: {source / 'anna_01.csv'}\n" in noted
     left = [line.split(": ")[1] for line in noted.splitlines() if line.startswith("left out")]
     assert left == [str(source / f"{name}_01.csv") for name in ("ben", "carl")]
     assert np.array_equal(sorted_out["CURV"], derived["CURV"])  # the walks are the same

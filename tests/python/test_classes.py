@@ -19,7 +19,7 @@ from gait.bindings.estimate import Estimate
 from gait.body.motion_classes import class_sections
 from gait.body.skeleton import points
 from gait.cli import main
-from gait.errors import GaitError, UserError
+from gait.errors import GaitError, UsageError, UserError
 from gait.io import blob, track_file
 from gait.learn.classes import run as class_run
 from gait.learn.classes import standing
@@ -28,6 +28,9 @@ from gait.learn.corpus.load import NothingLeft
 from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.prior.level import level_components
 from gait.learn.prior.model import meta_section, origin
+from gait.learn.report import page as pages
+from gait.learn.report.classes import figures
+from gait.learn.run import require_other_output
 from gait.motion.verdict import verdict_of
 from gait.report.drawing import class_words
 from gait.report.run_files import estimates_of
@@ -144,10 +147,25 @@ def test_learn_makes_classes_and_info_shows_them(tmp_path: Path, capsys: pytest.
     assert feet_lifted(blob.read(out)) < 1e-5
     page = (tmp_path / "report" / "index.html").read_text()
     assert '<a href="#classes">Classes of motion</a>' in page
+    assert "Mean posture of class stand" in page and "of class backwards" not in page
+    assert page.count("strip-class-1") == 2 and (tmp_path / "report" / "strip-class-1.png").exists()
     assert (
         "<td>stand</td><td>derived from the walk</td>" in page
         and ">walk 0.7 (prior), backwards 0.3 (prior)<" in page
     )
+
+
+def test_the_page_has_what_is_known_of_each_class() -> None:
+    row = ["a<b", 730, 4.0, 50, None]
+    run = {"subject_count": 2, "variance_explained": [0.5, 0.93], "sequences": {"count": 14, "rows": [row]}}
+    found = figures(blob.read(CLASSES), {"run": run})
+    page, info = pages._classes(found), gait.Model(CLASSES).class_info(3)
+    cells = ["recorded: 46 recordings of 2 people, 350 cycles", "1.37 ± 0.08", "0.73", "1.27 ± 0.10", "1.73"]
+    assert "".join(f"<td>{cell}</td>" for cell in cells) in page.replace('<td class="n">', "<td>")
+    assert found[3]["stride_length_sd_statures"] == pytest.approx(info.stride_length_sd, abs=1e-4)
+    assert "Sequences of class run" in page and "a&lt;b" in page and "and 13 more" in page
+    assert ">93<" in page and ">75<" in page  # the walk's is in META
+    assert "of 2 people" not in pages._classes(figures(blob.read(CLASSES)))
 
 
 def test_a_class_of_one_cycle_is_refused_and_nothing_is_written(
@@ -261,9 +279,16 @@ def test_any_other_cyclic_motion_is_a_class(tmp_path: Path, capsys: pytest.Captu
     assert main(["learn", str(tmp_path / "hops"), *words]) == 1
     assert "not learnt as 'walk': the legs do not alternate" in capsys.readouterr().err
     assert main(["learn", str(SHIPPED), *words, "--class", f"hop={tmp_path / 'hops'}"]) == 0
-    assert "class hop: 'hop' is none of walk, " in capsys.readouterr().err
+    found = capsys.readouterr()
+    assert "class hop: any motion that repeats is learnt as 'hop', which" in found.err
+    assert "class hop: recorded: 3 recordings of 3 people, 13 cycles, 1.33 +- " in found.out
+    assert " % of the variance, residual " in found.out.splitlines()[-2]
     assert main(["info", str(tmp_path / "m.gait")]) == 0
-    assert "class hop: recorded: 3 recordings, 13 cycles, 1.33 strides/s" in capsys.readouterr().out
+    printed = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("class hop"))
+    info = gait.Model(tmp_path / "m.gait").class_info(1)
+    rate = f"{info.stride_hz:.2f} +- {info.stride_hz_sd:.2f} strides/s (period 0.75 s)"
+    assert f"class hop: recorded: 3 recordings, 13 cycles, {rate}, " in printed
+    assert f"stride length {info.stride_length:.2f} +- {info.stride_length_sd:.2f} statures" in printed
     model = gait.Model(tmp_path / "m.gait")
     state = gait.State(motion_class=model.classes.index("hop"), phase=0.3)
     at = dict(zip(model.joint_names, model.pose(state)[0], strict=True))
@@ -309,6 +334,29 @@ def test_a_class_is_taken_from_a_model_by_its_name(
         assert main(["learn", str(SHIPPED), "-o", str(tmp_path / "no.gait"), "--class", given]) == 1
         assert f"--class {given}: {expected}" in capsys.readouterr().err
     assert not (tmp_path / "no.gait").exists()
+
+
+def test_no_model_that_is_read_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    own, link = Path("own.gait"), Path("link.gait")
+    own.write_bytes(SHIPPED.read_bytes())
+    link.symlink_to(own)
+    Path("limp.amc").write_text(mocap_files.BROKEN)  # not read
+    for source, given in (
+        ("own.gait", "limp=limp.amc"),
+        ("classes", "limp=own.gait"),
+        ("link.gait", "stand"),
+    ):
+        assert main(["learn", source, "-o", "own.gait", "--class", given]) == 2
+        error = capsys.readouterr().err
+        assert error == "gait learn: -o own.gait: is also an input; give the model another name\n"
+    assert own.read_bytes() == SHIPPED.read_bytes()
+    for sources, classes in ((("walk",), ()), (("limp.amc",), ("limp=walk",))):
+        options = LearnOptions(sources=sources, classes=classes, output=str(SHIPPED))
+        with pytest.raises(UsageError, match="is also an input"):
+            require_other_output(options)
 
 
 def test_shipped_models_are_taken_by_their_names(
@@ -371,7 +419,10 @@ def test_standing_is_learnt_from_people_who_stand(
     mocap_files.write_stand(tmp_path / "in", "carl_01", model, 0.0, walks=True)
     out, words = tmp_path / "m.gait", ["learn", str(SHIPPED), "-o", str(tmp_path / "m.gait")]
     assert main([*words, "--class", f"stand={tmp_path / 'in'}"]) == 0
-    assert "carl_01.csv: not learnt as 'stand': the person does not stand still" in capsys.readouterr().err
+    noted = capsys.readouterr().err
+    assert "carl_01.csv: not learnt as 'stand': the person does not stand still" in noted
+    stood = ", ".join(str(tmp_path / "in" / f"{name}.csv") for name in ("anna_01", "anna_02", "ben_01"))
+    assert f"--class stand: recorded: 3 recordings: {stood}\n" in noted
     derived, learnt = standing.sections(blob.read(SHIPPED))["CURV"], blob.read(out)["CUR1"]
     change = np.degrees(learnt[0, 0] - derived[0, 0])
     names = blob.unpack_names(blob.read(SHIPPED)["CHNM"])
@@ -388,6 +439,9 @@ def test_standing_is_learnt_from_people_who_stand(
     assert "none of the recordings can be used" in capsys.readouterr().err and not out.exists()
 
 
+UNFIT = "the name is blank, or has a comma, quote, '=', '/', '<', '>' or control character"
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -396,7 +450,11 @@ def test_standing_is_learnt_from_people_who_stand(
             "--class hop: only run, backwards and stand are sorted out of the sources; give a folder of "
             "recordings, --class hop=FOLDER",
         ),
-        (["stand", "stand"], "--class stand: give each class its own name"),
+        (["limp=in", "limp=im"], "--class limp=im: limp is given twice; give each class its own name"),
+        ([" =in"], "--class ' =in': the name is blank"),
+        (["=in"], "--class '=in': the name is blank"),
+        (["../x=in"], f"--class '../x=in': {UNFIT}"),
+        (["<b>x=in"], f"--class '<b>x=in': {UNFIT}"),
         (["walk"], "--class walk: give each class its own name, not walk"),
         (
             ["Walk=in"],
@@ -410,14 +468,14 @@ def test_standing_is_learnt_from_people_who_stand(
         (["\u00e9" * 16 + "=in"], "the name is longer than 31 bytes; shorten it"),
         (
             ["a,b=in"],
-            "--class 'a,b=in': the name has a comma, quote, '=' or control character",
+            f"--class 'a,b=in': {UNFIT}",
         ),
-        (['a"b=in'], "the name has a comma, quote, '=' or control character"),
+        (['a"b=in'], UNFIT),
         (
             ["a\nb=in"],
-            "--class 'a\\nb=in': the name has a comma, quote, '=' or control character",
+            f"--class 'a\\nb=in': {UNFIT}",
         ),
-        (["a\udcff=in"], "the name has a comma, quote, '=' or control character"),
+        (["a\udcff=in"], UNFIT),
     ],
 )
 def test_bad_classes_are_one_line(

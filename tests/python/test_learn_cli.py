@@ -217,7 +217,10 @@ def test_info_shows_what_was_learnt(learned, capsys):
 
 def test_an_activity_that_is_not_known_is_reported(walks, tmp_path, capsys):
     assert run("learn", walks, "-o", tmp_path / "m.gait", "--activity", "wlak", "--components", 1) == 0
-    assert "'wlak' is none of walk, walking, " in capsys.readouterr().err
+    assert (
+        "any motion that repeats is learnt as 'wlak', which is no name of walking or running"
+        in capsys.readouterr().err
+    )
 
 
 def test_people_without_arms_are_reported(walks, tmp_path, capsys):

@@ -232,7 +232,7 @@ def test_unusual_input_gives_a_report_too(sequences, tmp_path, monkeypatch, make
     monkeypatch.setattr(figures, "MOST_SEQUENCES", 10)
     monkeypatch.setattr(Drawing, "png", lambda self: self.figure.draw_without_rendering() or b"PNG")
     unusual = make(sequences)
-    pages.write(tmp_path, unusual, LearnOptions(activity="walk & run"), [], [])
+    pages.write(tmp_path, unusual, LearnOptions(activity="walk & run"), [], [], {})
     page = Page((tmp_path / "index.html").read_text())
     assert "Cyclic model of walk & run" in page.texts and "left-out" not in page.ids
     assert len(page.pictures) >= 10 and page.cells == 10 * len(unusual.sequences)

@@ -80,6 +80,7 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
 
 def text(name: str, s: Mapping[str, Any]) -> str:
     """Format the figures for people."""
+    from gait.learn.report import classes
     from gait.learn.segments import summary as segment_summary
 
     meta, gait = s.get("meta", {}), s.get("gait", {})
@@ -108,27 +109,13 @@ def text(name: str, s: Mapping[str, Any]) -> str:
         lines.append("variance explained: " + " ".join(f"{100 * v:.1f}" for v in shares) + " %")
     if "sides_alike" in meta:
         lines.append(f"lasting angles of left and right leg: correlation {meta['sides_alike']:.2f}")
-    for one in s.get("classes", []):
-        lines.append(_class_line(one))
+    lines += [classes.line(one) for one in s.get("classes", [])]
     if "segments" in s:
         lines += segment_summary.lines(s["segments"])
     if "acknowledgement" in meta:
         lines.append(meta["acknowledgement"])
     lines += meta.get("credits", [])
     return "\n".join(lines)
-
-
-def _class_line(one: Mapping[str, Any]) -> str:
-    """One class in words."""
-    from gait.learn.report.classes import words
-
-    cells = words(one)
-    moves = f"{cells['strides/s']} strides/s" if one["direction"] else cells["strides/s"]
-    components = count_of(int(cells["components"]), "component")
-    return (
-        f"class {cells['class']}: {cells['from']}, {moves}, {components}; "
-        f"changes per second: {cells['changes per second']}"
-    )
 
 
 def sequence_lines(rows: list[list[Any]]) -> list[str]:

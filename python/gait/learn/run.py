@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from gait.bindings.model import is_model, model_file
 from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UsageError, UserError
 from gait.io import blob
@@ -40,13 +41,15 @@ def run(
     complete: Callable[[Sections], Sections] = lambda sections: sections,
     left_out: Callable[[str], str] = lambda line: line,
     only: Collection[Path] = (),
+    metas: Mapping[str, Mapping[str, Any]] = classes.NO_METAS,
 ) -> dict[str, Any]:
     """Learn a model, write it and its report, and return the figures of `report.summary`.
 
     `note` gets lines that a user should know.  `complete` adds to the sections of the model before they are
     written.  `left_out` returns what to report about a file that was left out, from the line about it; '' if
-    it belongs to another class.  ``only``: files of the sources to learn from, if not all.  UsageError or
-    UserError with one line if it cannot be done.
+    it belongs to another class.  ``only``: files of the sources to learn from, if not all.  ``metas``: META
+    of the classes that `complete` adds, for the report.  UsageError or UserError with one line if it cannot
+    be done.
     """
     check(options, note)
     with one_thread(), Corpus() as corpus:
@@ -62,8 +65,10 @@ def run(
         data = blob.write(options.output, sections)
         if options.report:
             try:
-                found = classes.figures(sections)
-                page.write(Path(options.report), learned, options, loaded.refused, found, options.quiet)
+                found = classes.figures(sections, metas)
+                page.write(
+                    Path(options.report), learned, options, loaded.refused, found, sections, options.quiet
+                )
             except BaseException:
                 print(f"{options.output}: the model is written; the report is not", file=sys.stderr)
                 raise
@@ -75,9 +80,21 @@ def check(options: LearnOptions, note: Note = lambda line: None) -> None:
     if options.report and options.segments.source == "only":
         raise UsageError("--report draws the cyclic model; leave it out, or --segments only")
     if options.activity.lower() not in verdict.NAMES:
-        names = ", ".join(verdict.NAMES)
-        note(f"{options.activity!r} is none of {names}: any cyclic motion is accepted")
+        activity = repr(options.activity)
+        note(f"any motion that repeats is learnt as {activity}, which is no name of walking or running")
+    require_other_output(options)
     output, report = Path(os.path.realpath(options.output)), options.report
+    if report and output in ((folder := Path(os.path.realpath(report))), *folder.parents):
+        raise UsageError(f"--report {report}: the model goes to {options.output}; name another folder")
+    require_writable(options.output)
+    if report:
+        require_folder(report)
+        page.require_own(Path(report))
+
+
+def require_other_output(options: LearnOptions) -> None:
+    """Raise UsageError if the model would replace a file that is read, or has the name of a recording."""
+    output = Path(os.path.realpath(options.output))
     if output.suffix.lower() in (*SUFFIXES, ".asf"):
         raise UsageError(
             f"-o {options.output}: has the name of a recording; name the model M.gait, and sources before -o"
@@ -86,16 +103,12 @@ def check(options: LearnOptions, note: Note = lambda line: None) -> None:
         *options.sources,
         *options.static,
         *options.changes,
+        *(text.partition("=")[2] for text in options.classes),
         *([str(options.markers.path)] if options.markers else []),
     ]
-    if any(os.path.realpath(path) == str(output) for path in read if path):
+    files = (model_file(path) if is_model(path) else path for path in read if path)
+    if any(os.path.realpath(file) == str(output) for file in files):
         raise UsageError(f"-o {options.output}: is also an input; give the model another name")
-    if report and output in ((folder := Path(os.path.realpath(report))), *folder.parents):
-        raise UsageError(f"--report {report}: the model goes to {options.output}; name another folder")
-    require_writable(options.output)
-    if report:
-        require_folder(report)
-        page.require_own(Path(report))
 
 
 def _load(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,7 @@ class MotionClass:
     cycles: int = 0  #: number of cycles from which it was learnt
     recordings: int = 0
     changes: Mapping[str, Change] = field(default_factory=dict)  #: to other classes
+    meta: Mapping[str, Any] = field(default_factory=dict)  #: META of the model it was alone in, if known
 
 
 def join(first: Sections, classes: Sequence[MotionClass]) -> dict[str, blob.Array]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from operator import add
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -31,14 +31,15 @@ from gait.learn.options import LearnOptions, SegmentOptions
 from gait.learn.prior import model
 from gait.learn.prior.level import level_components
 from gait.learn.report.classes import figures as class_figures
-from gait.learn.run import Note, check, run
+from gait.learn.run import Note, check, require_other_output, run
 from gait.learn.solve import readers
 from gait.progress import progress
 
 WALK, STAND, BACKWARDS, RUN = "walk", "stand", "backwards", "run"
 DERIVED = STAND, BACKWARDS  # made from the walk, without recordings
-UNFIT = ",\"'="  # for names of classes, which are in headers of track files
+UNFIT = ",\"'=/<>"  # for names of classes, which are in headers of track files, in paths and on pages
 MOST_SHOWN = 60  # most characters of an unfit name in an error
+MOST_NAMED = 8  # most recordings in a line
 T = TypeVar("T")
 STEP_CONCENTRATION = 6.0  # concentration with an sd of about a twentieth of a stride
 #: Rates of change from one class to another, per second at the most likely phase and pace, before recordings
@@ -81,7 +82,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         return _only_changes(own, options, note)
     _require(wanted, options)
     learnt = {name: _taken(name, source) for name, source in wanted.items() if is_model(source)}
-    taken, posture = set(learnt), None
+    taken, posture, metas = set(learnt), None, dict[str, Mapping[str, Any]]()
     if own is None:
         check(alone)
     elif not class_names(own):
@@ -95,7 +96,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         if name in taken:
             continue
         if name == STAND:
-            posture = _mean_posture(_postures(source, options, note), options) if source else None
+            posture = _recorded_posture(_postures(source, options, note), options, note) if source else None
         elif source or name != BACKWARDS:
             refused = None if source else sorter.not_runs
             learnt[name], files = _learnt(name, source, options, note, refused)
@@ -112,6 +113,7 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         if others := [name for name in names[1:] if name in kept]:
             note(f"{options.sources[0]}: keeps its classes {' '.join(others)}")
         every = [replace(one, changes=_changes(one, names, kept)) for one in classes.values()]
+        metas.update((one.name, one.meta) for one in every)
         credited = model.with_credits(
             walk, [{"credits": options.credit}, *(blob.read_meta(one.own or {}) for one in every)]
         )
@@ -124,9 +126,17 @@ def learn(options: LearnOptions, note: Note) -> dict[str, Any]:
         data = blob.write(options.output, with_classes(own))
         figures: dict[str, Any] = {"bytes": len(data), "crc32": f"{blob.checksum(data):08x}"}
     else:
-        figures = run(alone, note, with_classes, sorter.left_out)
+        figures = run(alone, note, with_classes, sorter.left_out, metas=metas)
         data = Path(options.output).read_bytes()
-    return figures | {"classes": class_figures(blob.decode(data))}
+    return figures | {"classes": class_figures(blob.decode(data), metas)}
+
+
+class _Posture(NamedTuple):
+    """The mean posture of people who stand."""
+
+    angles: Floats  #: (24,)
+    recordings: int
+    people: int
 
 
 @dataclass
@@ -185,13 +195,14 @@ class _Sorter:
         self.note(f"--class {BACKWARDS}: derived, as the walk in reverse: {why}")
         return {}
 
-    def posture(self) -> tuple[Floats, int] | None:
-        """Return the result of `_mean_posture` of people who stand; None if there are none."""
+    def posture(self) -> _Posture | None:
+        """Return the posture of people who stand; None if there are none."""
+        if self.stands:
+            return _recorded_posture(self.stands, self.options, self.note)
         if STAND in self.names:
-            count = count_of(len(self.stands), "recording")
             why = "derived from the walk: in none of the recordings a person stands still throughout"
-            self.note(f"--class {STAND}: " + (f"recorded: {count}" if self.stands else why))
-        return _mean_posture(self.stands, self.options) if self.stands else None
+            self.note(f"--class {STAND}: {why}")
+        return None
 
 
 def _level_curves(joined: Mapping[str, blob.Array], learnt: Sequence[int]) -> dict[str, blob.Array]:
@@ -241,12 +252,17 @@ def _postures(source: str, options: LearnOptions, note: Note) -> dict[Path, Floa
     return _each(f"--class {STAND}", (source,), angles, options, note)
 
 
-def _mean_posture(found: Mapping[Path, Floats], options: LearnOptions) -> tuple[Floats, int]:
-    """Return the mean angles (24,) over people, from postures by recording, and the number of recordings."""
+def _recorded_posture(found: Mapping[Path, Floats], options: LearnOptions, note: Note) -> _Posture:
+    """Return the mean over people of the postures in recordings, and report which these are."""
+    names = [str(path) for path in found]
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    count = count_of(len(names), "recording")
+    note(f"--class {STAND}: recorded: {count}: {', '.join(names[:MOST_NAMED])}{more}")
     people: dict[str, list[Floats]] = {}
     for person, one in zip(subjects(list(found), options.subjects), found.values(), strict=True):
         people.setdefault(person, []).append(one)
-    return column_means(np.array([column_means(np.array(each)) for each in people.values()])), len(found)
+    mean = column_means(np.array([column_means(np.array(each)) for each in people.values()]))
+    return _Posture(mean, len(found), len(people))
 
 
 def _each(
@@ -285,7 +301,9 @@ def _parsed(options: LearnOptions, names: Sequence[str]) -> dict[str, str]:
     for text in options.classes:
         name, _, source = text.partition("=")
         _require_name(f"--class {text!a}"[:MOST_SHOWN], name)
-        if not name or name in wanted or name == first:
+        if name in wanted:
+            raise UsageError(f"--class {text}: {name} is given twice; give each class its own name")
+        if name == first:
             raise UsageError(f"--class {text}: give each class its own name, not {first}")
         if like := [
             other for other in (*names, *wanted) if other.casefold() == name.casefold() and other != name
@@ -307,7 +325,8 @@ def _parsed(options: LearnOptions, names: Sequence[str]) -> dict[str, str]:
 
 
 def _require(wanted: Mapping[str, str], options: LearnOptions) -> None:
-    """Raise UserError, before any recording is read, if sources or the model's folder do not exist."""
+    """Raise errors about sources and the model's file before any recording is read."""
+    require_other_output(options)
     require_writable(options.output)
     recordings = () if adds_to_a_model(options) else options.sources
     for sources in filter(None, (recordings, options.changes)):
@@ -322,21 +341,21 @@ def _require(wanted: Mapping[str, str], options: LearnOptions) -> None:
 
 def _require_name(given: str, name: str) -> None:
     """Raise UsageError, about the words `given`, for a name that models or track files cannot have."""
-    if not name.isprintable() or set(name) & set(UNFIT):
-        words = "the name has a comma, quote, '=' or control character"
+    if not name.strip() or not name.isprintable() or set(name) & set(UNFIT):
+        words = "the name is blank, or has a comma, quote, '=', '/', '<', '>' or control character"
         raise UsageError(f"{given}: {words}; use letters and digits")
     if len(name.encode()) >= blob.NAME_BYTES:
         raise UsageError(f"{given}: the name is longer than {blob.NAME_BYTES - 1} bytes; shorten it")
 
 
-def _derived(
-    name: str, walk: Mapping[str, blob.Array], first: str, posture: tuple[Floats, int] | None
-) -> MotionClass:
-    """Return a class derived from the first; `posture`: result of `_mean_posture`, for standing."""
+def _derived(name: str, walk: Mapping[str, blob.Array], first: str, posture: _Posture | None) -> MotionClass:
+    """Return a class derived from the first; `posture`: for standing."""
     if name == BACKWARDS:
         return MotionClass(BACKWARDS, -1, source=first)
-    angles, recordings = posture or (None, 0)
-    return MotionClass(STAND, 0, own=standing.sections(walk, angles), recordings=recordings)
+    if posture is None:
+        return MotionClass(STAND, 0, own=standing.sections(walk))
+    own, meta = standing.sections(walk, posture.angles), {"subject_count": posture.people}
+    return MotionClass(STAND, 0, own=own, recordings=posture.recordings, meta=meta)
 
 
 def _taken(name: str, source: str) -> MotionClass:
@@ -407,10 +426,10 @@ def _learnt(
 
 
 def _counted(one: MotionClass, own: Mapping[str, blob.Array]) -> MotionClass:
-    """Return a class with the numbers of cycles and recordings in the META of its model."""
+    """Return a class with the META of its model, and the numbers of cycles and recordings in it."""
     meta = blob.read_meta(own)
     recordings = meta.get("sequences", {}).get("count", 0)
-    return replace(one, cycles=int(meta.get("cycles", 0)), recordings=int(recordings))
+    return replace(one, cycles=int(meta.get("cycles", 0)), recordings=int(recordings), meta=meta)
 
 
 def _changes(one: MotionClass, names: list[str], kept: Collection[str]) -> dict[str, Change]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
+from gait.body.motion_classes import class_names, class_sections
 from gait.body.skeleton import ANGLES, CHANNELS
+from gait.io import blob
 from gait.learn.arrays import Floats, Indices
 from gait.learn.cycles import period
 from gait.learn.cycles.sequence import Sequence
@@ -41,6 +43,7 @@ SUBJECTS = (
     "without it. Left: rms over the angles. Right: mean distance of 14 joints with the pelvis aligned, on "
     f"one body of mean proportions, {ADULT_STATURE[0]:.2f} m tall."
 )
+OF_CLASS = "The right side is bold. Each figure has its lowest point on the ground, in flight too."
 
 
 def drawings(learned: Learned) -> Iterator[Drawing]:
@@ -80,6 +83,18 @@ def drawings(learned: Learned) -> Iterator[Drawing]:
     yield Drawing(
         "convergence", "Convergence", "The objectives may never rise.", figures_model.convergence(learned)
     )
+
+
+def of_classes(learned: Learned, sections: Mapping[str, blob.Array]) -> Iterator[Drawing]:
+    """Draw the mean cycle of each class after the first that has its own curves; a posture only once."""
+    for k, name in enumerate(class_names(sections)):
+        direction, source = sections["CLIN"][k][:2].tolist()
+        if k and source == k:
+            cycle = np.asarray(class_sections(sections, k)["CURV"][0], float)
+            phases = figures_model.STRIP_PHASES if direction else 1
+            drawn = figures_model.strip(learned, None, cycle, phases)
+            heading = f"Mean {'cycle' if direction else 'posture'} of class {name}"
+            yield Drawing(f"strip-class-{k}", heading, OF_CLASS, drawn)
 
 
 def _model(learned: Learned) -> Iterator[Drawing]:

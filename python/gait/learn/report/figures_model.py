@@ -70,16 +70,19 @@ def curves(learned: Learned, shown: Sequence[str] = SHOWN_ANGLES) -> Figure:
     return figure
 
 
-def strip(learned: Learned, moved: Floats | None) -> Figure:
-    """Draw stick figures over one cycle, from the side and from the front.
+def strip(
+    learned: Learned, moved: Floats | None, cycle: Floats | None = None, phases: int = STRIP_PHASES
+) -> Figure:
+    """Draw stick figures over one cycle (T, M), by default the mean, from the side and from the front.
 
-    With `moved` (T, M), the mean plus and minus twice this change is drawn over the mean.
+    With `moved` (T, M), the cycle plus and minus twice this change is drawn over it.
     """
+    cycle = learned.curves[0] if cycle is None else cycle
     figure, panels = grid(2, 1, 10, 4.6)
     turns = [0.0] if moved is None else [0.0, -2.0, 2.0]
     top = 1.05
     for turn in turns:
-        joints = bodies(learned, learned.curves[0] if moved is None else learned.curves[0] + turn * moved)
+        joints = bodies(learned, cycle if moved is None else cycle + turn * moved, phases)
         top = max(top, float(joints[..., 2].max()))
         colour = {0.0: DARK if moved is None else GREY, -2.0: BLUE, 2.0: ORANGE}[turn]
         for axes, across in zip(panels, (0, 1), strict=True):
@@ -89,15 +92,13 @@ def strip(learned: Learned, moved: Floats | None) -> Figure:
         axes.grid(visible=False)
         axes.axhline(0, color="#cccccc", lw=0.8, zorder=0)
         axes.set(
-            xlim=(-0.6 * FIGURE_SPACING, (STRIP_PHASES - 0.4) * FIGURE_SPACING),
+            xlim=(-0.6 * FIGURE_SPACING, (phases - 0.4) * FIGURE_SPACING),
             ylim=(-0.04, top + 0.03),
             yticks=[],
             ylabel=name,
         )
         axes.spines[["left", "bottom"]].set_visible(False)
-        axes.set_xticks(
-            FIGURE_SPACING * np.arange(STRIP_PHASES), [f"{i / STRIP_PHASES:g}" for i in range(STRIP_PHASES)]
-        )
+        axes.set_xticks(FIGURE_SPACING * np.arange(phases), [f"{i / phases:g}" for i in range(phases)])
     panels[1].set_xlabel(PHASE_LABEL)
     if moved is not None:
         line_legend(figure, SD_COLOURS)
@@ -106,7 +107,7 @@ def strip(learned: Learned, moved: Floats | None) -> Figure:
 
 def bodies(learned: Learned, cycle: Floats, phases: int = STRIP_PHASES) -> Floats:
     """Return joints (phases, P, 3) of a cycle (T, M) in statures, the lowest point on the ground."""
-    at = np.arange(phases) * len(PHASE_AXIS) // phases
+    at = np.arange(phases) * len(cycle) // phases
     joints = points(default_skeleton(learned.proportions).sections(), cycle[at])
     joints[:, :, 2] -= joints[:, :, 2].min(axis=1, keepdims=True)
     return joints

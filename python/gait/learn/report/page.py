@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gait.errors import UserError
+from gait.io import blob
 from gait.io.files import filling
 from gait.learn.cycles.sequence import Sequence
 from gait.learn.options import LearnOptions
@@ -29,7 +32,9 @@ figure { margin: 0; } figcaption { color: var(--faint); margin: 0 0 .5em; }
 """
 #: Columns of numbers.
 NUMBER_COLUMNS = ("period, ms", "cycles", "SNR", "sharpness", "residual, °")
-_OF_CLASSES = ("strides/s", "statures/s", "components")
+_OF_CLASSES = (
+    *("strides/s", "period, s", "stride length, statures", "statures/s", "components", "variance, %"),
+)
 
 
 def require_own(folder: Path) -> None:
@@ -54,16 +59,17 @@ def write(
     options: LearnOptions,
     refused: list[str],
     classes: list[dict[str, Any]],
+    sections: Mapping[str, blob.Array],
     quiet: bool = True,
 ) -> None:
     """Write `folder`/*.png and `folder`/index.html, which needs no other file; all of them or none.
 
-    `classes`: `gait.learn.report.classes.figures` of the model.
+    `classes`: `gait.learn.report.classes.figures` of the model, which has the `sections`.
     UserError if the folder cannot be made or written.
     """
     try:
         with filling(folder) as new:
-            stems = _write_all(new, learned, options.activity, refused, classes, quiet)
+            stems = _write_all(new, learned, options.activity, refused, classes, sections, quiet)
         for old in folder.glob("strip-*.png"):  # of a run with more components
             if old.stem not in stems:
                 old.unlink()
@@ -77,14 +83,15 @@ def _write_all(
     activity: str,
     refused: list[str],
     classes: list[dict[str, Any]],
+    sections: Mapping[str, blob.Array],
     quiet: bool,
 ) -> set[str]:
     """Write the files into an empty folder and return the stems of the figures."""
-    from gait.learn.report.figures import drawings  # Matplotlib is slow to import
+    from gait.learn.report.figures import drawings, of_classes  # Matplotlib is slow to import
 
     parts, links = [], []
     with progress("drawing the report", None, quiet) as update:
-        for number, drawing in enumerate(drawings(learned)):
+        for number, drawing in enumerate(chain(drawings(learned), of_classes(learned, sections))):
             update(number)
             parts.append(_figure(folder, drawing))
             links.append((drawing.stem, drawing.heading))
@@ -160,9 +167,21 @@ def _classes(classes: list[dict[str, Any]]) -> str:
         return ""
     return (
         '<h2 id="classes">Classes of motion</h2>'
-        "<p>Mean stride rate and speed, and how often a person changes to another class, where in the stride "
-        "that is most likely.</p>" + _table([motion_classes.words(one) for one in classes])
+        "<p>Stride rate and stride length, mean &plusmn; sd between people; variance that the components "
+        "explain; rms over all angles of what they do not; and how often a person changes to another class, "
+        "where in the stride that is most likely. Empty cells are not known.</p>"
+        + _table([motion_classes.words(one, "±") for one in classes])
+        + "".join(_sequences_of_class(one["name"], one["sequences"]) for one in classes if one["sequences"])
     )
+
+
+def _sequences_of_class(name: str, found: dict[str, Any]) -> str:
+    """Return the table of a class's first sequences, from META of its model."""
+    columns = ("sequence", "period, ms", "cycles", "sharpness", "residual, °")
+    rows = [["-" if cell is None else str(cell) for cell in row] for row in found["rows"]]
+    more = f"<p>and {rest} more</p>" if (rest := found["count"] - len(rows)) > 0 else ""
+    table = _table([dict(zip(columns, row, strict=True)) for row in rows])
+    return f"<h3>Sequences of class {html.escape(name)}</h3>{table}{more}"
 
 
 def _table(rows: list[dict[str, str]]) -> str:

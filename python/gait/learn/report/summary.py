@@ -17,6 +17,7 @@ from gait.learn.cycles.sequence import Sequence
 from gait.learn.options import DEFAULT_COMPONENTS, PAPER_COMPONENTS, LearnOptions
 from gait.learn.prior import model, people
 from gait.learn.prior.fit import Learned, made_up_channels
+from gait.learn.report import classes
 from gait.learn.segments import summary as segment_summary
 
 MOST_NAMED_SUBJECTS = 8  # of subjects
@@ -92,7 +93,8 @@ def text(path: str, s: dict[str, Any]) -> str:
     """Format the figures for people; a segment prior alone, and classes alone, have fewer."""
     written = f"{path}: {s['bytes']} bytes, checksum {s['crc32']}"
     if "sequences" not in s and "classes" in s:  # added to a model
-        return f"{path}: {s['bytes']} bytes, classes {' '.join(each['name'] for each in s['classes'])}"
+        names = " ".join(one["name"] for one in s["classes"])
+        return "\n".join([*map(classes.line, s["classes"]), f"{path}: {s['bytes']} bytes, classes {names}"])
     if "sequences" not in s:
         return f"{segment_summary.text(s['segments'])}\n{written}"
     explained = " ".join(f"{100 * v:.0f}" for v in s["variance_explained"])
@@ -106,6 +108,7 @@ def text(path: str, s: dict[str, Any]) -> str:
         f"residual {s['residual_deg']:.1f} deg",
         *_left_out(s.get("by_subject", [])),
         *([segment_summary.text(s["segments"])] if s["segments"] else []),
+        *map(classes.line, s.get("classes", [])),
         written,
     ]
     return "\n".join(lines)
