@@ -89,9 +89,11 @@ def _text(parameters: Parameters, norms: Sequence[Compared], without: str, model
     """Format tables for the terminal."""
     from gait.report.gait_parts import NORM_HEAD, PARAMETER_HEADER, norm_people, norm_rows, parameter_rows
 
-    notes = f"mean ± its standard deviation (between strides) over {parameters.counted()}; uncertainty from "
-    notes += parameters.source
-    lines = [*_table([list(PARAMETER_HEADER), *parameter_rows(parameters)]), notes]
+    lines = []
+    if parameters.counting:
+        lines = _table([list(PARAMETER_HEADER), *parameter_rows(parameters)])
+        notes = f"mean ± its standard deviation (between strides) over {parameters.counted()}"
+        lines.append(f"{notes}; uncertainty from {parameters.source}")
     lines += [parameters.warning()] * bool(parameters.warning())
     if norms:
         lines += ["", *_table([list(NORM_HEAD), *norm_rows(norms)]), norm_people(model, parameters)]

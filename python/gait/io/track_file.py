@@ -38,6 +38,7 @@ STATUSES = ("init", "tracking", "ambiguous", "lost")
 CLASS_COLUMN, CLASS_PREFIX = "motion_class", "p_"
 WALKING = "walk"  # class that needs no mention
 STANDING = "stand"  # class of a person without a phase
+RUNNING = ("run", "running", "jog", "jogging")  # names of classes in which both feet leave the floor
 CLIP_COLUMNS = ("reason", "first_frame", "last_frame")
 FILM_COLUMN = "film"
 PERSON_COLUMN = "person"
@@ -255,6 +256,16 @@ class Joints:
         """Return the positions of EVAL15, shape (n, 15, 3)."""
         return np.stack([self.places[name] for name in EVAL15], axis=1)
 
+    @property
+    def stands(self) -> NDArray[np.bool_]:
+        """Whether the person is known to take no strides, (n,)."""
+        return np.zeros(len(self.frame), bool)
+
+    @property
+    def runs(self) -> NDArray[np.bool_]:
+        """Whether the person is known to run, (n,)."""
+        return np.zeros(len(self.frame), bool)
+
 
 @dataclass(frozen=True)
 class Track(Joints):
@@ -285,6 +296,20 @@ class Track(Joints):
         """Names of the classes of motion of the model that tracked; empty if it has only one."""
         columns = [name for name in self.numbers if name.startswith(CLASS_PREFIX)]
         return tuple(name.removeprefix(CLASS_PREFIX) for name in columns) if self.motion_class else ()
+
+    @property
+    def stands(self) -> NDArray[np.bool_]:
+        """Whether the class stands or the phase is empty, (n,); nowhere if the track has neither (lifts)."""
+        empty = np.isnan(self.phase)
+        if not any(self.motion_class):
+            return empty & ~empty.all()
+        return empty | (np.array(self.motion_class) == STANDING)
+
+    @property
+    def runs(self) -> NDArray[np.bool_]:
+        """Whether the class is one of `RUNNING`, (n,)."""
+        classes = self.motion_class or [""] * len(self.frame)
+        return np.array([name.lower() in RUNNING for name in classes], bool)
 
     def eval15_sd(self) -> Array:
         """Return the standard deviations of EVAL15, shape (n, 15, 3)."""

@@ -1,7 +1,8 @@
 """When and where the feet of a walking person touch and leave the ground, with uncertainties.
 
 A heel strike is when the heel is furthest ahead of the pelvis along the walking direction, a toe-off when the
-toe is furthest behind it (Zeni et al. 2008, Gait & Posture 27:710).
+toe is furthest behind it (Zeni et al. 2008, Gait & Posture 27:710).  There are no events while the person
+stands, and no toe-offs in runs, in which the toe is furthest behind the pelvis after it has left the ground.
 
 Uncertainty is represented by draws.  With the motions of ``gait track --draws`` each draw is a whole motion,
 so lasting errors are the same at both ends of a stride, as they should be.  A track without draws has only
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 import os
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
@@ -217,6 +218,12 @@ class Events:
     #: Times (k,) by side, "right" or "left".
     strike: dict[str, Array]
     off: dict[str, Array]
+    #: (m, 2) seconds: first and last frame of each interval in which the person takes no strides.
+    stands: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def walk(self, times: Array) -> NDArray[np.int64]:
+        """Return the number of stands before each of `times` (k,), which numbers the walks between them."""
+        return np.searchsorted(self.stands[:, 0], times)
 
     @property
     def count(self) -> int:
@@ -241,12 +248,20 @@ class Contacts:
 def find_events(joints: Joints) -> Events:
     """Find the strikes and toe-offs of a motion of at least three frames."""
     ahead, pelvis = walking_direction(joints), joints.places["pelvis"]
+    stands, runs = joints.stands, joints.runs
     strike, off = {}, {}
     for side in STRIKE_SIDES:
         heel, toe = (joints.places[f"{side[0]}_{part}"] - pelvis for part in ("heel", "toe"))
-        strike[side] = furthest(joints.time, np.sum(heel * ahead, axis=1))
-        off[side] = furthest(joints.time, -np.sum(toe * ahead, axis=1))
-    return Events(strike, off)
+        strike[side] = _outside(stands, joints, furthest(joints.time, np.sum(heel * ahead, axis=1)))
+        off[side] = _outside(stands | runs, joints, furthest(joints.time, -np.sum(toe * ahead, axis=1)))
+    change = np.diff(stands.astype(int), prepend=0, append=0)
+    ends = np.flatnonzero(change > 0), np.flatnonzero(change < 0) - 1
+    return Events(strike, off, np.stack([joints.time[rows] for rows in ends], axis=1))
+
+
+def _outside(frames: NDArray[np.bool_], joints: Joints, times: Array) -> Array:
+    """Return those of `times` whose nearest frame is none of `frames` (n,)."""
+    return times[np.interp(times, joints.time, frames) < 0.5]
 
 
 def same_events(found: Events, wanted: Events) -> Events:
@@ -282,8 +297,10 @@ def at(time: Array, values: Array, when: Array) -> Array:
 
 
 def stride_time(events: Events) -> float:
-    """Return the median time between strikes of one foot, seconds; NaN if no foot strikes twice."""
-    gaps = np.concatenate([np.diff(events.strike[side]) for side in STRIKE_SIDES])
+    """Return the median time between strikes of one foot, seconds; NaN if no foot strikes twice in a walk."""
+    gaps = np.concatenate(
+        [np.diff(times)[np.diff(events.walk(times)) == 0] for times in events.strike.values()]
+    )
     return float(np.median(gaps)) if len(gaps) else float("nan")
 
 

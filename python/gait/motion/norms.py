@@ -138,7 +138,7 @@ def beside_norms(
     rate = 1 / pace["mean"]
     norms = {name: (*norm, "pace") for name, norm in people(model, rate, stature).items()}
     speed = summary["speed_m_s"]["both"]
-    if speed is not None:
+    if speed is not None and speed["mean"] > 0:
         mean, sd = rate_at(model, speed["mean"], stature)
         norms["cadence_spm"] = 120 * mean, 120 * sd, "speed"
         for name, share in (("stride_time_s", 1.0), ("step_time_s", 0.5)):

@@ -52,7 +52,24 @@ PARAMETER_LABELS = {
 
 _UNSURE_STATUSES = {"lost", "ambiguous"}
 _LONGEST_FLIGHT = 0.25  # of a stride, from one foot's toe-off to the other's strike; longer: one was missed
-_STEADY = 0.8  # of the median speed; at the ends of the walk, slower strides are starting or stopping
+_STEADY = 0.8  # of the median speed; at the ends of a walk, slower strides are starting or stopping
+#: Degrees by which the heading turns between the strikes of a stride in a turn.  On an arc, a stride of 1.3 m
+#: that turns by this departs from its chord by 5.7 cm, which the step width contains, more than the sd among
+#: people (4.5 cm).  Estimated headings of straight walks differ by up to 15 degrees (decisions.md).
+_TURN_DEG = 20.0
+LEFT_OUT = {
+    "uncertain": "uncertain",
+    "stand": "beside a stand",
+    "class": "not of class {}",
+    "turn": "in a turn",
+    "slow": "while starting or stopping",
+}
+"""Why a stride does not count, in the order of the checks, with words for people.
+
+Some of its frames are ambiguous or lost (only lost, if no stride is without); it begins or ends less than a
+step from a stand; it is of another class than the most frequent one; the heading turns in it
+(unless it does in all that are left); or it is much slower than the median, at the end of a walk.
+"""
 MIRRORED_PARAMETERS = ("step_time_s", "step_length_m", "stance_percent")
 """Quantities for which left and right are compared."""
 
@@ -70,11 +87,19 @@ class Strides:
     sd: dict[str, Array]
     draws: dict[str, Array]  #: (D, k) `PARAMETER_LABELS` in each draw
     sure: NDArray[np.bool_]  #: (k,) none of its frames is lost or ambiguous
-    #: (k,) whether the stride counts for the means: it is sure (if no stride is, none of its frames is lost),
-    #: the person neither starts nor stops in it, and its class is `Parameters.motion_class`
-    counts: NDArray[np.bool_]
+    #: (k,) Why the stride does not count for the means, one of `LEFT_OUT`, or "" if it counts.
+    left_out: NDArray[np.str_]
     #: Class of motion of each stride, or "" if it changes; empty if the track has none.
     motion_class: Sequence[str] = ()
+
+    @property
+    def counts(self) -> NDArray[np.bool_]:
+        """Whether the stride counts for the means, (k,)."""
+        return np.asarray(self.left_out == "")
+
+    def leave_out(self, which: NDArray[np.bool_], why: str) -> None:
+        """Leave out those strides of `which` (k,) that still count; `why`: one of `LEFT_OUT`."""
+        self.left_out[which & self.counts] = why
 
 
 @dataclass(frozen=True)
@@ -87,9 +112,19 @@ class Parameters:
     strides: dict[str, Strides]  #: by side
     source: str  #: where the uncertainty comes from, in words
     all_unsure: bool = False  #: every stride has ambiguous frames; those that were not lost count
-    slowing: int = 0  #: number of strides that do not count because the person starts or stops in them
+    all_turn: bool = False  #: every stride that counts is in a turn
+    runs: bool = False  #: the person runs in some frames, for which no toe-offs are known
     motion_class: str = ""  #: of the strides that count, the most frequent; "" if the track has no classes
-    others: int = 0  #: number of strides that do not count because they are of another class
+
+    @property
+    def counting(self) -> int:
+        """Number of strides of both feet that count."""
+        return int(sum(s.counts.sum() for s in self.strides.values()))
+
+    @property
+    def others(self) -> int:
+        """Number of strides that do not count because they are of another class."""
+        return self._number("class")
 
     @property
     def speed(self) -> float | None:
@@ -100,27 +135,38 @@ class Parameters:
     def counted(self) -> str:
         """Describe the strides over which the means are taken."""
         right, left = (int(self.strides[side].counts.sum()) for side in STRIKE_SIDES)
-        text = f"{right} right and {left} left strides"
-        left_out = sum(len(s.counts) for s in self.strides.values()) - right - left
-        if not left_out:
-            return text
-        unsure = left_out - self.slowing - self.others
-        why = [f"{unsure} uncertain"] * bool(unsure)
-        other = f"not of class {self.motion_class}" if self.motion_class else "in which the class changes"
-        why += [f"{self.others} {other}"] * bool(self.others)
-        why += [f"{self.slowing} while starting or stopping"] * bool(self.slowing)
-        return f"{text} (not counted: {', '.join(why)})"
+        why = self._not_counted()
+        return f"{right} right and {left} left strides" + (f" (not counted: {why})" if why else "")
 
     def warning(self) -> str:
-        """Return why the means are missing or cannot be relied on, as a sentence; empty if they can."""
-        if self.others and not self.motion_class:
-            return "No stride has one class of motion throughout, so none counts and there are no means."
-        if self.all_unsure:
-            return (
+        """Return what is missing or cannot be relied on, in sentences; empty if nothing is."""
+        found = []
+        if not self.counting:
+            found.append(f"No stride counts, so there are no means: {self._not_counted()}.")
+        elif self.all_unsure:
+            found.append(
                 "Every stride has uncertain frames. The values are means over these strides anyway: left and "
                 "right may be swapped, or the figure may be off."
             )
-        return ""
+        if self.all_turn:
+            found.append(
+                f"Every stride is in a turn of more than {_TURN_DEG:.0f} degrees. The values are means over "
+                "these strides anyway; norms are those of straight walks."
+            )
+        if self.runs:
+            found.append(
+                "Toe-offs, stance and double support are not given for runs, in which the foot leaves the "
+                "floor before the toe is furthest back."
+            )
+        return " ".join(found)
+
+    def _number(self, why: str) -> int:
+        return int(sum((s.left_out == why).sum() for s in self.strides.values()))
+
+    def _not_counted(self) -> str:
+        words = LEFT_OUT | {"class": LEFT_OUT["class"].format(self.motion_class)}
+        words |= {} if self.motion_class else {"class": "in which the class changes"}
+        return ", ".join(f"{self._number(why)} {words[why]}" for why in LEFT_OUT if self._number(why))
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Compute means over the strides that count: by quantity, for right, left and both feet.
@@ -173,7 +219,7 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
     """Measure the gait parameters of a track.
 
     `track`: at least three frames. `draws`: motions drawn from the posterior; without them the standard
-    deviations of the track are used. UserError if no foot strikes twice in the track.
+    deviations of the track are used. UserError if no foot strikes twice in a walk of the track.
     """
     if len(track.frame) < 3:
         raise UserError("has fewer than three frames; track at least two strides")
@@ -181,7 +227,8 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
     stride = stride_time(events)
     if not np.isfinite(stride):
         seconds = track.time[-1] - track.time[0]
-        raise UserError(f"has no whole stride in {seconds:.2f} s; track at least two strides")
+        stood = ", as the person stood throughout" if track.stands.all() else ""
+        raise UserError(f"has no whole stride in {seconds:.2f} s{stood}; track at least two strides")
     feet = {side: contacts(track, events, side, stride) for side in STRIKE_SIDES}
     drawn, event_sd, source = draw_contacts(track, events, stride, draws)
     strides = {}
@@ -189,38 +236,45 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
         between = _between(feet[side].strike, feet[other].strike)
         values = stride_quantities(feet[side], feet[other], between)
         many = stride_quantities(drawn[side], drawn[other], between)
-        start, end = feet[side].strike[:-1], feet[side].strike[1:]
-        whole = _whole(start, end, stride)
-        free = [_is_free(track, _UNSURE_STATUSES, *ends) for ends in zip(start, end, strict=True)]
-        sure = np.array(free, bool)[whole]
+        whole = _whole(events, side, stride)
+        start, end = feet[side].strike[:-1][whole], feet[side].strike[1:][whole]
         strides[side] = Strides(
             side,
-            start[whole],
-            end[whole],
+            start,
+            end,
             {name: value[whole] for name, value in values.items()},
             {name: sd_of(value[:, whole]) for name, value in many.items()},
             {name: value[:, whole] for name, value in many.items()},
-            sure,
-            sure.copy(),
-            [_class_of(track, *ends) for ends in zip(start[whole], end[whole], strict=True)]
-            if track.motion_class
-            else [],
+            np.array(
+                [_is_free(track, _UNSURE_STATUSES, *ends) for ends in zip(start, end, strict=True)], bool
+            ),
+            _counting(len(start)),
+            [_class_of(track, *ends) for ends in zip(start, end, strict=True)] if track.motion_class else [],
         )
-    some = any(s.counts.any() for s in strides.values())
-    if not some:  # better than nothing, since left and right seldom swap in only some frames
-        for s in strides.values():
-            s.counts[:] = [_is_free(track, {"lost"}, *ends) for ends in zip(s.start, s.end, strict=True)]
-    motion_class, others = _most_frequent_class(strides)
+    none_sure = not any(s.sure.any() for s in strides.values())
+    for s in strides.values():
+        # Better than nothing, since left and right seldom swap in only some frames.
+        lost = [not _is_free(track, {"lost"}, *ends) for ends in zip(s.start, s.end, strict=True)]
+        s.leave_out(np.array(lost, bool) if none_sure else ~s.sure, "uncertain")
+        s.leave_out(_beside_stand(s, events, stride / 2), "stand")
+    motion_class = _leave_out_other_classes(strides)
+    all_turn = _leave_out_turns(strides, track)
+    _leave_out_slow(strides, events)
     return Parameters(
         events,
         event_sd,
         strides,
         source,
-        all_unsure=not some,
-        slowing=_leave_out(strides),
+        all_unsure=none_sure,
+        all_turn=all_turn,
+        runs=bool(track.runs.any()),
         motion_class=motion_class,
-        others=others,
     )
+
+
+def _counting(number: int) -> NDArray[np.str_]:
+    """`Strides.left_out` of strides that all count."""
+    return np.full(number, "", f"U{max(map(len, LEFT_OUT))}")
 
 
 def _class_of(track: Track, start: float, end: float) -> str:
@@ -230,38 +284,60 @@ def _class_of(track: Track, start: float, end: float) -> str:
     return found.pop() if len(found) == 1 else ""
 
 
-def _most_frequent_class(strides: Mapping[str, Strides]) -> tuple[str, int]:
-    """Leave out strides of all but the most frequent class; return that class and their number."""
+def _beside_stand(strides: Strides, events: Events, step: float) -> NDArray[np.bool_]:
+    """Which strides begin less than a step (seconds) after a stand, or end less than a step before one."""
+    walk = events.walk(strides.start)
+    stood = np.append(-np.inf, events.stands[:, 1])[walk]
+    stands = np.append(events.stands[:, 0], np.inf)[walk]
+    return np.asarray((strides.start - stood < step) | (stands - strides.end < step))
+
+
+def _leave_out_other_classes(strides: Mapping[str, Strides]) -> str:
+    """Leave out strides of all but the most frequent class; return that class."""
     if not any(s.motion_class for s in strides.values()):
-        return "", 0
+        return ""
     numbers = Counter(
         name
         for s in strides.values()
         for name, counts in zip(s.motion_class, s.counts, strict=True)
         if counts and name
     )
-    most, count = max(numbers, key=lambda name: (numbers[name], name), default=""), 0
+    most = max(numbers, key=lambda name: (numbers[name], name), default="")
     for s in strides.values():
-        other = s.counts & np.array([name != most or not name for name in s.motion_class], bool)
-        count += int(other.sum())
-        s.counts[other] = False
-    return most, count
+        s.leave_out(np.array([name != most or not name for name in s.motion_class], bool), "class")
+    return most
 
 
-def _leave_out(strides: Mapping[str, Strides]) -> int:
-    """Leave out much slower strides at the ends of the walk; return how many there are."""
+def _leave_out_turns(strides: Mapping[str, Strides], track: Track) -> bool:
+    """Leave out strides in turns, unless there are no others; return whether there are none."""
+    if "heading_rad" not in track.numbers:
+        return False
+    heading = np.degrees(np.unwrap(track.numbers["heading_rad"]))
+    turned = {
+        side: np.abs(np.interp(s.end, track.time, heading) - np.interp(s.start, track.time, heading))
+        > _TURN_DEG
+        for side, s in strides.items()
+    }
+    counts = np.concatenate([s.counts for s in strides.values()])
+    if counts.any() and np.concatenate(list(turned.values()))[counts].all():
+        return True
+    for side, s in strides.items():
+        s.leave_out(turned[side], "turn")
+    return False
+
+
+def _leave_out_slow(strides: Mapping[str, Strides], events: Events) -> None:
+    """Leave out much slower strides at the ends of each walk."""
     speed = np.concatenate([s.values["speed_m_s"] for s in strides.values()])
     start = np.concatenate([s.start for s in strides.values()])
     counts = np.concatenate([s.counts for s in strides.values()])
-    steady = counts & (speed >= _STEADY * np.median(speed[counts])) if counts.any() else counts
-    if not steady.any():
-        return 0
-    count = 0
+    if not counts.any():
+        return
+    steady = start[counts & (speed >= _STEADY * np.median(speed[counts]))]
     for s in strides.values():
-        slow = (s.start < start[steady].min()) | (s.start > start[steady].max())
-        count += int((slow & s.counts).sum())
-        s.counts[slow] = False
-    return count
+        ends = [steady[events.walk(steady) == walk] for walk in events.walk(s.start)]
+        inside = [len(own) and own.min() <= at <= own.max() for own, at in zip(ends, s.start, strict=True)]
+        s.leave_out(~np.array(inside, bool), "slow")
 
 
 def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:
@@ -276,19 +352,22 @@ def strides_of(motion: Joints, events: Events) -> dict[str, Strides]:
     out = {}
     for side, other in (STRIKE_SIDES, STRIKE_SIDES[::-1]):
         values = stride_quantities(feet[side], feet[other], _between(feet[side].strike, feet[other].strike))
-        start, end = feet[side].strike[:-1], feet[side].strike[1:]
-        whole = _whole(start, end, stride)
+        whole = _whole(events, side, stride)
+        start, end = feet[side].strike[:-1][whole], feet[side].strike[1:][whole]
         known = {name: value[whole] for name, value in values.items()}
         unknown = {name: np.full(value.shape, np.nan) for name, value in known.items()}
         draws = {name: value[None] for name, value in unknown.items()}
-        sure = np.ones(whole.sum(), bool)
-        out[side] = Strides(side, start[whole], end[whole], known, unknown, draws, sure, sure.copy())
+        out[side] = Strides(
+            side, start, end, known, unknown, draws, np.ones(len(start), bool), _counting(len(start))
+        )
     return out
 
 
-def _whole(start: Array, end: Array, stride: float) -> NDArray[np.bool_]:
-    """Which intervals between strikes are one stride, without a missed strike in between."""
-    return (end - start > 0.6 * stride) & (end - start < LONGEST_CYCLE * stride)
+def _whole(events: Events, side: str, stride: float) -> NDArray[np.bool_]:
+    """Which intervals between strikes of a foot are one stride, without a stand or missed strike."""
+    strike = events.strike[side]
+    time = np.diff(strike)
+    return (time > 0.6 * stride) & (time < LONGEST_CYCLE * stride) & (np.diff(events.walk(strike)) == 0)
 
 
 def measured(track: Track, draws: Draws | None = None) -> Parameters | None:
@@ -352,10 +431,9 @@ def _between(strike: Array, other: Array) -> NDArray[np.int64]:
 
 
 def _is_free(track: Track, statuses: set[str], start: float, end: float) -> bool:
-    """Whether no frame of a stride has one of these statuses, and the person takes strides in all of them."""
+    """Whether no frame of a stride has one of these statuses."""
     inside = (track.time >= start) & (track.time <= end)
-    walks = np.isfinite(track.phase[inside]).all() or np.isnan(track.phase).all()  # as in lifted motion
-    return bool(walks) and not statuses & {track.status[i] for i in np.flatnonzero(inside)}
+    return not statuses & {track.status[i] for i in np.flatnonzero(inside)}
 
 
 def mean_of(values: Array, axis: int) -> Array:
@@ -409,21 +487,31 @@ class AngleCycle:
 
 
 def without_norm(parameters: Parameters, model: Mapping[str, Any]) -> str:
-    """Explain why a model has no norm for the strides that count; "" if it has one."""
+    """Explain why a model has no norm for the strides that count; "" if it has one.
+
+    It has none for classes without strides, whose rate or length is 0 in `GAIT`.
+    """
     name, names = parameters.motion_class, class_names(model) or [first_class(model)]
     if name and name not in names:
         return f"the model has no class {name}; give the model that was tracked with, -m MODEL"
     if name and "CLIN" in model and model["CLIN"][names.index(name)][0] < 0:
         return f"strides of class {name} are the model's in reverse, for which there is no norm"
+    gait = _model_of_class(parameters, model).get("GAIT", np.zeros(4))
+    if not (gait[0] > 0 and gait[3] > 0):
+        return f"{f'the class {name} of ' if name else ''}the model takes no strides"
     return ""
+
+
+def _model_of_class(parameters: Parameters, model: Mapping[str, Any]) -> Mapping[str, Any]:
+    name, names = parameters.motion_class, class_names(model)
+    return class_sections(model, names.index(name)) if name in names else model
 
 
 def norm_model(parameters: Parameters, model: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the model of the class of the strides that count; UserError `without_norm`."""
     if reason := without_norm(parameters, model):
         raise UserError(reason)
-    name, names = parameters.motion_class, class_names(model)
-    return class_sections(model, names.index(name)) if name in names else model
+    return _model_of_class(parameters, model)
 
 
 def angle_cycles(
@@ -556,7 +644,7 @@ def stride_rows(parameters: Parameters) -> Iterator[dict[str, Any]]:
         s = parameters.strides[side]
         for k in range(len(s.start)):
             row: dict[str, Any] = {"side": side, "start_s": float(s.start[k]), "end_s": float(s.end[k])}
-            row |= {"sure": bool(s.sure[k]), "counts": bool(s.counts[k])}
+            row |= {"sure": bool(s.sure[k]), "counts": bool(s.counts[k]), "left_out": str(s.left_out[k])}
             if s.motion_class:
                 row["motion_class"] = s.motion_class[k]
             for name in PARAMETER_LABELS:

@@ -85,12 +85,11 @@ def draw_contacts(
 def _shifted(events: Events, stride: float, common: float, random: np.random.Generator) -> Events:
     """Shift all events alike, with sd `common` (strides), and each foot's strikes and toe-offs by its own."""
     late = common * random.standard_normal()
-    return Events(
-        *(
-            {side: times + stride * (late + sd * random.standard_normal()) for side, times in kind.items()}
-            for kind, sd in ((events.strike, _STRIKE_SD), (events.off, _OFF_SD))
-        )
+    strike, off = (
+        {side: times + stride * (late + sd * random.standard_normal()) for side, times in kind.items()}
+        for kind, sd in ((events.strike, _STRIKE_SD), (events.off, _OFF_SD))
     )
+    return Events(strike, off)
 
 
 def _lasting_phase_sd(track: Track, draws: Draws | None) -> float:

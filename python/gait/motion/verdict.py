@@ -74,7 +74,8 @@ class Verdict:
     def sentence(self) -> str:
         """One sentence: what was tracked, how the person walked, and what is uncertain."""
         parts = [f"Tracked {self.tracked} of {count_of(self.total, 'frame')}"]
-        if self.motion_class == STANDING and not self.strides:
+        stood = self.motion_class == STANDING and not self.strides
+        if stood:
             parts.append("stood throughout")
         else:
             strides = count_of(self.strides, "whole stride") if self.strides else "no whole stride"
@@ -87,7 +88,7 @@ class Verdict:
             text += f"; {what} in {count_of(self.counts['ambiguous'], 'frame')}"
             why = [f"{reason} ({count})" for reason, count in self.why.items()]
             text += f": {', '.join(why if len(why) > 1 else self.why)}" if why else ""
-        rest = {"no strides": self.no_strides} if self.no_strides else {}
+        rest = {"no strides": 0 if stood else self.no_strides}
         rest |= {"lost": self.counts["lost"], "settling": self.counts["init"], "not found": self.absent}
         return "; ".join([text, *(f"{what} in {count_of(n, 'frame')}" for what, n in rest.items() if n)])
 
@@ -148,7 +149,7 @@ def verdict_of(
         strides=0 if parameters is None else _strides(parameters),
         speed=speed,
         in_place=in_place,
-        no_strides=0 if np.isnan(track.phase).all() else int(np.isnan(track.phase).sum()),
+        no_strides=int(track.stands.sum()),
         why=dict(reasons.most_common()),
         motion_class=_class_to_name(track, parameters),
         along_path=others,

@@ -38,14 +38,17 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
     tips = {
         PARAMETER_LABELS[name]: words for name, words in terms.QUANTITY_TERMS.items()
     } | terms.COLUMN_TERMS
-    page.grid("Gait", PARAMETER_HEADER, parameter_rows(parameters), tips)
+    if parameters.counting:
+        page.grid("Gait", PARAMETER_HEADER, parameter_rows(parameters), tips)
+    else:
+        page.heading("Gait")
     if warning := parameters.warning():
         page.words(warning, "warning")
-    page.words(
-        f"Mean over {parameters.counted()} ± its standard deviation; in brackets the standard deviation "
-        f"between strides. Source of the uncertainty: {parameters.source}.",
-        "faint",
-    )
+    source = f"Source of the uncertainty: {parameters.source}."
+    if parameters.counting:
+        means = f"Mean over {parameters.counted()} ± its standard deviation"
+        source = f"{means}; in brackets the standard deviation between strides. {source}"
+    page.words(source, "faint")
     page.figure("Footfalls", footfall_plot(track, parameters))
     page.words(
         "Bars: the foot is on the floor. Ticks: heel strikes (above) and toe-offs (below), two sd to each "
@@ -130,14 +133,16 @@ def _meaning(names: list[str]) -> str:
 def floor_contacts(track: Track, events: Events, side: str) -> tuple[Array, Array]:
     """Return when a foot came to the floor and left it, (n,) each, seconds.
 
-    A contact lasts until the next toe-off, however long the person stands, but not beyond the next strike.
+    A contact lasts until the next toe-off, but not beyond the next strike. While the person stands, however
+    long, both feet are on the floor. Contacts in runs, whose ends are unknown, are left out.
     """
-    strike, off = events.strike[side], events.off[side]
+    strike, off = np.sort(np.append(events.strike[side], events.stands[:, 0])), events.off[side]
     on_floor_first = len(off) > 0 and (not len(strike) or off[0] < strike[0])
     begin = np.append(track.time[0], strike) if on_floor_first else strike
     latest = np.append(begin[1:], track.time[-1])
-    after = np.append(off, np.inf)[np.searchsorted(off, begin, side="right")]
-    return begin, np.minimum(after, latest)
+    end = np.minimum(np.append(off, np.inf)[np.searchsorted(off, begin, side="right")], latest)
+    runs = np.interp([begin, end], track.time, track.runs).max(axis=0) >= 0.5
+    return begin[~runs], end[~runs]
 
 
 def footfall_plot(track: Track, parameters: Parameters) -> str:
@@ -182,7 +187,10 @@ def stride_plot(track: Track, parameters: Parameters) -> str:
 
         return paint
 
-    return panels([painter(name) for name in _BY_STRIDE], "Quantities stride by stride")
+    known = [
+        n for n in _BY_STRIDE if any(np.isfinite(s.values[n]).any() for s in parameters.strides.values())
+    ]
+    return panels([painter(name) for name in known], "Quantities stride by stride")
 
 
 def angle_painter(name: str, cycles: Mapping[str, AngleCycle]) -> Painter:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait.body.skeleton import ANGLES, JOINTS, SIDES, default_skeleton, points
+from gait.io.track_file import RUNNING
 from gait.learn.arrays import Floats, column_means
 from gait.learn.cycles import stride
 from gait.learn.cycles.fourier import first_harmonic
@@ -20,7 +21,7 @@ from gait.learn.solve.body import Body
 #: Names that users may give to the two activities that can be recognised.
 NAMES = {
     **dict.fromkeys(("walk", "walking", "gait"), "walk"),
-    **dict.fromkeys(("run", "running", "jog", "jogging"), "run"),
+    **dict.fromkeys(RUNNING, "run"),
 }
 #: Percentile of a joint's height that is its height in stance; a runner's foot stands for 30 %.
 STANCE_PERCENTILE = 15
