@@ -31,6 +31,7 @@ from gait.motion.footfalls import (
     contacts,
     find_events,
     stride_time,
+    walking_direction,
 )
 from gait.motion.uncertainty import draw_contacts
 
@@ -53,10 +54,11 @@ PARAMETER_LABELS = {
 _UNSURE_STATUSES = {"lost", "ambiguous"}
 _LONGEST_FLIGHT = 0.25  # of a stride, from one foot's toe-off to the other's strike; longer: one was missed
 _STEADY = 0.8  # of the median speed; at the ends of a walk, slower strides are starting or stopping
-#: Degrees by which the heading turns between the strikes of a stride in a turn.  On an arc, a stride of 1.3 m
-#: that turns by this departs from its chord by 5.7 cm, which the step width contains, more than the sd among
-#: people (4.5 cm).  Estimated headings of straight walks differ by up to 15 degrees (decisions.md).
+#: Degrees by which the heading or the path turns between the strikes of a stride in a turn.  On an arc, a
+#: stride of 1.3 m that turns by this departs from its chord by 5.7 cm, which the step width contains, more
+#: than the sd among people (4.5 cm).  Straight walks turn by up to 17 degrees in tracks (decisions.md).
 _TURN_DEG = 20.0
+_LEAST_WAY_M = 0.3  # metres that the pelvis moves in a stride; with less, its path has no direction
 LEFT_OUT = {
     "uncertain": "uncertain",
     "stand": "beside a stand",
@@ -67,7 +69,7 @@ LEFT_OUT = {
 """Why a stride does not count, in the order of the checks, with words for people.
 
 Some of its frames are ambiguous or lost (only lost, if no stride is without); it begins or ends less than a
-step from a stand; it is of another class than the most frequent one; the heading turns in it
+step from a stand; it is of another class than the most frequent one; the person turns in it
 (unless it does in all that are left); or it is much slower than the median, at the end of a walk.
 """
 MIRRORED_PARAMETERS = ("step_time_s", "step_length_m", "stance_percent")
@@ -258,7 +260,7 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
         s.leave_out(np.array(lost, bool) if none_sure else ~s.sure, "uncertain")
         s.leave_out(_beside_stand(s, events, stride / 2), "stand")
     motion_class = _leave_out_other_classes(strides)
-    all_turn = _leave_out_turns(strides, track)
+    all_turn = _leave_out_turns(strides, track, stride)
     _leave_out_slow(strides, events)
     return Parameters(
         events,
@@ -308,16 +310,18 @@ def _leave_out_other_classes(strides: Mapping[str, Strides]) -> str:
     return most
 
 
-def _leave_out_turns(strides: Mapping[str, Strides], track: Track) -> bool:
+def _leave_out_turns(strides: Mapping[str, Strides], track: Track, stride: float) -> bool:
     """Leave out strides in turns, unless there are no others; return whether there are none."""
-    if "heading_rad" not in track.numbers:
-        return False
-    heading = np.degrees(np.unwrap(track.numbers["heading_rad"]))
-    turned = {
-        side: np.abs(np.interp(s.end, track.time, heading) - np.interp(s.start, track.time, heading))
-        > _TURN_DEG
-        for side, s in strides.items()
-    }
+    path = np.unwrap(np.arctan2(*walking_direction(track, stride).T[[1, 0]]))
+    heading = np.unwrap(track.numbers.get("heading_rad", np.zeros(len(path))))
+    turned = {}
+    for side, s in strides.items():
+        by_path, by_heading = (
+            np.abs(np.interp(s.end, track.time, angle) - np.interp(s.start, track.time, angle))
+            for angle in (path, heading)
+        )
+        moves = s.values["speed_m_s"] * (s.end - s.start) > _LEAST_WAY_M
+        turned[side] = np.maximum(by_heading, np.where(moves, by_path, 0.0)) > np.radians(_TURN_DEG)
     counts = np.concatenate([s.counts for s in strides.values()])
     if counts.any() and np.concatenate(list(turned.values()))[counts].all():
         return True
