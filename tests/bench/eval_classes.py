@@ -40,10 +40,10 @@ from numpy.typing import NDArray
 from gait import Camera, Model, Start, Tracker, TrackerConfig, Video
 from gait.bindings.abi import TrackStatus
 from gait.bindings.model import read_cyclic
-from gait.body.motion_classes import of_class
+from gait.body.motion_classes import STANDING, of_class
 from gait.body.skeleton import EVAL15
 from gait.io import blob
-from gait.io.track_file import STANDING, Joints, read_estimates, read_true_phase, read_truth
+from gait.io.track_file import Joints, read_estimates, read_true_phase, read_truth
 from gait.io.video import read_plate
 from gait.motion.evaluate import coverage, phase_errors
 from gait.motion.footfalls import strikes_of

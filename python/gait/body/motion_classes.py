@@ -7,6 +7,9 @@ from typing import Any
 
 from gait.io import blob
 
+WALKING = "walk"  # class that needs no mention
+STANDING = "stand"  # class of a person without a phase
+RUNNING = ("run", "running", "jog", "jogging")  # names of classes in which both feet leave the floor
 #: Sections that a class may have itself, with their tags for class k.
 CLASS_TAGS = {"CURV": "CUR{}", "CHST": "CHS{}", "SCST": "SCS{}", "GAIT": "GAI{}", "PACE": "PAC{}"}
 _SOURCE_COLUMN = 1  # of CLIN
@@ -20,7 +23,7 @@ def class_names(sections: Mapping[str, Any]) -> list[str]:
 def first_class(sections: Mapping[str, Any]) -> str:
     """Return the name of a model's first class of motion, also if it has no sections of classes."""
     names = class_names(sections)
-    return names[0] if names else str(blob.read_meta(sections).get("activity", "walk"))
+    return names[0] if names else str(blob.read_meta(sections).get("activity", WALKING))
 
 
 def of_class(tag: str) -> bool:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
+from gait.body.motion_classes import RUNNING, STANDING
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.errors import UserError
 from gait.io.fields import frame_numbers
@@ -36,9 +37,6 @@ STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
 CLASS_COLUMN, CLASS_PREFIX = "motion_class", "p_"
-WALKING = "walk"  # class that needs no mention
-STANDING = "stand"  # class of a person without a phase
-RUNNING = ("run", "running", "jog", "jogging")  # names of classes in which both feet leave the floor
 CLIP_COLUMNS = ("reason", "first_frame", "last_frame")
 FILM_COLUMN = "film"
 PERSON_COLUMN = "person"

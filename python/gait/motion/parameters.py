@@ -262,16 +262,8 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
     motion_class = _leave_out_other_classes(strides)
     all_turn = _leave_out_turns(strides, track, stride)
     _leave_out_slow(strides, events)
-    return Parameters(
-        events,
-        event_sd,
-        strides,
-        source,
-        all_unsure=none_sure,
-        all_turn=all_turn,
-        runs=bool(track.runs.any()),
-        motion_class=motion_class,
-    )
+    runs = bool(track.runs.any())
+    return Parameters(events, event_sd, strides, source, none_sure, all_turn, runs, motion_class)
 
 
 def _counting(number: int) -> NDArray[np.str_]:

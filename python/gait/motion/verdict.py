@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gait.body.motion_classes import STANDING, WALKING
 from gait.counts import count_of
-from gait.io.track_file import STANDING, STATUSES, WALKING, Track
+from gait.io.track_file import STATUSES, Track
 from gait.motion.parameters import Parameters, measured
 
 WHICH_LEG = "the images do not show which leg is the right one"

@@ -12,11 +12,12 @@ from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model, read_cyclic
 from gait.bindings.state import State
+from gait.body.motion_classes import WALKING
 from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.files import is_unfinished, replacing
-from gait.io.track_file import CLASS_PREFIX, WALKING, Track, read_track
+from gait.io.track_file import CLASS_PREFIX, Track, read_track
 from gait.io.video import Video
 from gait.motion.evaluate import Measures
 from gait.motion.footfalls import Draws

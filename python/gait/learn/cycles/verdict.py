@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gait.body.motion_classes import RUNNING
 from gait.body.skeleton import ANGLES, JOINTS, SIDES, default_skeleton, points
-from gait.io.track_file import RUNNING
 from gait.learn.arrays import Floats, column_means
 from gait.learn.cycles import stride
 from gait.learn.cycles.fourier import first_harmonic
