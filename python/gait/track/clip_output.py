@@ -149,6 +149,9 @@ def write(
         estimates = _counted(found, results, update)
         if options.smooth:
             estimates = _smoothed(options, scene, tracker, estimates, plausibility)
+        if not films.wanted:
+            estimates = _without_pictures(estimates)
+        estimates = plausibility.doubted(estimates)
         if keypoints is not None:
             estimates = Standing(keypoints, tracker.model.directions).decided(estimates)
         if also is not None:
@@ -230,6 +233,14 @@ def _widened(sink: Sink, calibration: Calibration | None) -> Sink:
     return lambda frame, estimate: sink(frame, calibration.widened(frame.time, estimate))
 
 
+def _without_pictures(found: Iterable[Estimated]) -> Iterator[Estimated]:
+    """Yield every frame with its estimate, without the pictures: some wait, and would need memory."""
+    nothing = np.empty((0, 0, 3), np.uint8)
+    for frame, estimate in found:
+        others = tuple(view and view._replace(image=nothing, plate=None) for view in frame.others)
+        yield frame._replace(image=nothing, plate=None, others=others), estimate
+
+
 def _passed(found: Iterable[Estimated], to: Sink) -> Iterator[Estimated]:
     """Yield every frame with its estimate after passing them to a sink."""
     for frame, estimate in found:
@@ -265,6 +276,7 @@ def _smoothed(
     frames: Iterable[Frame] = (frame for frame, _ in rows)
     if options.overlay or options.report:  # decode the pictures again
         frames = scene.video.frames(rows[0][0].number, rows[-1][0].number + 1)
-    yield from zip(frames, plausibility.judged_later(rows), strict=True)
+    judged = plausibility.judged_later(rows)
+    yield from ((frame, estimate) for frame, (_, estimate) in zip(frames, judged, strict=True))
     if options.draws:  # last, so that they are never left beside an unfinished track
         draws.write(options.draws)

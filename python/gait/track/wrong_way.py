@@ -1,0 +1,108 @@
+"""Whether an estimate is the wrong way round: the person faces, or moves, against it.
+
+The last second of a track decides.  A detector confuses front and back in single frames, and the place of a
+person seen from the front is uncertain, so less evidence is only a doubt.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from gait.bindings.abi import TrackStatus
+from gait.bindings.estimate import Estimate
+from gait.io.video import Frame
+from gait.track.person_keypoints import PersonKeypoints
+from gait.track.person_shapes import PersonShapes
+
+_TURNED_S = 0.5  # of the last second, in which keypoints show the trunk facing the other way
+_NOT_TURNED_S = 0.25  # of it, up to which they no longer do
+_FRAME_S = 0.1  # for which one frame of them counts at most
+_AGAINST = 0.3  # metres in the last second by which the pelvis moves against the strides, also on a treadmill
+_STRIDES = 0.2  # metres; shorter strides have no direction
+_LONGEST_S = 2.0  # seconds before for which frames in doubt wait
+_TURNED = "the detected joints show the person facing the other way"
+_MOVES = "the person moves against the direction of the strides"
+
+
+class WrongWay:
+    """What the last second shows, frame by frame.
+
+    Parameters
+    ----------
+    keypoints : PersonKeypoints or PersonShapes
+    directions : mapping of str to int
+        `Model.directions`.
+
+    Attributes
+    ----------
+    reason : str
+        Why the last estimate is the wrong way round; empty if it is not.
+    doubtful : bool
+        Whether anything in the last second indicates it.
+    """
+
+    def __init__(self, keypoints: PersonKeypoints | PersonShapes, directions: Mapping[str, int]) -> None:
+        self._keypoints, self._directions = keypoints, directions
+        self._second: deque[tuple[float, ...]] = deque()  # times, places, velocities, seconds turned
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the last second, since the track starts again elsewhere."""
+        self._second.clear()
+        self.reason, self.doubtful = "", False
+
+    def add(self, frame: Frame, estimate: Estimate) -> None:
+        """Add an estimate; the frames' times may decrease."""
+        since = abs(frame.time - self._second[-1][0]) if self._second else 0.0
+        turned = min(since, _FRAME_S) if self._keypoints.faces(frame, estimate) is False else 0.0
+        heading = estimate.mean.heading
+        speed = self._directions[estimate.motion_class] * estimate.speed
+        velocity = speed * np.cos(heading), speed * np.sin(heading)
+        self._second.append((frame.time, *estimate.mean.pelvis[:2], *velocity, turned))
+        while abs(frame.time - self._second[0][0]) > 1.0:
+            self._second.popleft()
+        mirrored = sum(row[-1] for row in self._second)
+        moved, strides = self.path()
+        length, along = float(np.hypot(*strides)), float(moved @ strides)
+        if mirrored > (_NOT_TURNED_S if self.reason == _TURNED else _TURNED_S):
+            self.reason = _TURNED
+        else:
+            self.reason = _MOVES if length > _STRIDES and along < -_AGAINST * length else ""
+        self.doubtful = mirrored > 0.0 or along < 0.0
+
+    def path(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return how far the pelvis moved in the last second, and how far strides lead, (2,) metres."""
+        rows = np.array(self._second)
+        times, places, velocities = rows[:, 0], rows[:, 1:3], rows[:, 3:5]
+        return places[-1] - places[0], (velocities[1:] * np.diff(times)[:, None]).sum(axis=0)
+
+
+def doubted(found: Iterable[tuple[Frame, Estimate]], wrong_way: WrongWay) -> Iterator[tuple[Frame, Estimate]]:
+    """Yield the frames of a track in order; those that led to the wrong way round are `ambiguous` too.
+
+    These are the frames since the first doubt, up to `_LONGEST_S` before.  In doubt, frames wait that long.
+    """
+    held: deque[tuple[Frame, Estimate]] = deque()
+    for frame, estimate in found:
+        if estimate.frame == 0:  # a start
+            yield from held
+            held.clear()
+            wrong_way.restart()
+        wrong_way.add(frame, estimate)
+        held.append((frame, estimate))
+        if wrong_way.reason:
+            held = deque((one, as_ambiguous(now, wrong_way.reason)) for one, now in held)
+        while held and (not wrong_way.doubtful or frame.time - held[0][0].time > _LONGEST_S):
+            yield held.popleft()
+    yield from held
+
+
+def as_ambiguous(estimate: Estimate, reason: str) -> Estimate:
+    """Return an estimate that is `tracking` as `ambiguous`, others as they are."""
+    if estimate.status != TrackStatus.TRACKING:
+        return estimate
+    return replace(estimate, status=TrackStatus.AMBIGUOUS, reason=reason)
