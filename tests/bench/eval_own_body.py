@@ -1,14 +1,13 @@
 #!/usr/bin/env python3
 """Tracks with the model's body and with estimates of the person's: from a first pass, and live.
 
-    eval_own_body.py [--record] [--seeds 501,502] [--frames 90] [--groups table drawn development]
+    eval_own_body.py [--record] [--seeds 501,502] [--frames 90] [--groups table drawn]
 
 Simulated walks by two cameras (gait simulate --cameras 2) of people with the proportions of textbooks (table)
-and with those of people who were recorded (drawn); and the development clips, one camera, each with a model
-learnt without its subject.  own: the body from a first pass, as by gait track --body auto, which refuses a
-single camera; live: the proportions vary among the particles (setting `proportions` of the tracker).  With
-the detector and all defaults, one run each.  The development clips alone have a page of their own.  Clips and
-tracks are kept in build/eval-cameras.
+and with those of people who were recorded (drawn).  own: the body from a first pass, as by gait track --body
+auto; live: the proportions vary among the particles (setting `proportions` of the tracker).  With the
+detector and all defaults, one run each.  One view: eval_one_view.py.  Clips and tracks are kept in
+build/eval-cameras.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from pathlib import Path
 from unittest.mock import patch
 
 import eval_cameras
-import eval_clips
 import numpy as np
 import table
 
@@ -37,8 +35,7 @@ from gait.track.further_cameras import with_further_cameras
 from gait.track.own_body import FirstPass, own_model
 from gait.track.read_scene import read_scene
 
-DEVELOPMENT = "development"
-GROUPS = "table", "drawn", DEVELOPMENT
+GROUPS = "table", "drawn"
 ARMS = "model", "own", "live"
 TITLE = "The person's body: the model's, and estimates of it"
 MEASURES = "pose mm", "joints mm", "inside %", "tracking %"
@@ -65,7 +62,6 @@ def main() -> int:
     options.add_argument("--record", action="store_true")
     args = options.parse_args()
     cases = list(simulated(args.groups, [int(word) for word in args.seeds.split(",")], args.frames))
-    cases += developed() if DEVELOPMENT in args.groups else []
     found: dict[Case, dict[str, tuple[float, ...]]] = {}
     with progress("clips", len(cases)) as update:
         for case in cases:
@@ -77,27 +73,17 @@ def main() -> int:
         for case, arms in found.items()
     ]
     note, missed = words(found)
-    page = f"own_body_{DEVELOPMENT}" if list(args.groups) == [DEVELOPMENT] else "own_body"
-    table.publish(page, TITLE, HEAD, rows, note, record=args.record)
+    table.publish("own_body", TITLE, HEAD, rows, note, record=args.record)
     return int(missed)
 
 
 def simulated(groups: Sequence[str], seeds: list[int], frames: int) -> Iterator[Case]:
     """Yield simulated walks by two cameras, made unless they are there."""
-    for body in (group for group in groups if group != DEVELOPMENT):
+    for body in groups:
         for view in eval_cameras.VIEWS:
             for seed in seeds:
                 folder, _ = eval_cameras.made(view, seed, frames, body=body)
                 yield Case(folder, body, ((str(folder / "video_2.mp4"), str(folder / "camera_2.json")),))
-
-
-def developed() -> Iterator[Case]:
-    """Yield the development clips, if they are there."""
-    if not eval_clips.absent():
-        clips, models = eval_clips.people()
-        for clip in clips:
-            height = eval_clips.meta_of(clip.folder)["stature_m"]
-            yield Case(clip.folder, DEVELOPMENT, (), str(models[clip.subject or ""]), height)
 
 
 def measured(case: Case) -> dict[str, tuple[float, ...]]:
