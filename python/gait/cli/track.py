@@ -41,13 +41,17 @@ from __future__ import annotations
 
 import argparse
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gait.bindings.abi import MAX_CAMERAS, Mode
 from gait.cli import values
 from gait.errors import UsageError
 from gait.io.files import require_outputs
-from gait.track.options import KEYPOINTS_SD
+from gait.track.options import KEYPOINTS_SD, ClipOptions
+
+if TYPE_CHECKING:
+    from gait.track.scene import Scene
+    from gait.track.standing import Moved
 
 EXAMPLES = """\
 examples:
@@ -105,8 +109,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--body",
         metavar="BODY.json|auto",
         help="measurements of the person, instead of --height: stature_m, and any of leg_m, arm_m or "
-        "their parts, hip_width_m, shoulder_width_m. auto: with several films, estimate where the person's "
-        "joints are from a first pass",
+        "their parts, hip_width_m, shoulder_width_m. auto: estimate where the person's joints are, from a "
+        "first pass with several films, and with one by also lifting its keypoints, as gait lift does",
     )
     values.add_filter(parser, threads=1)
     values.add_seed(parser, "the random numbers")
@@ -181,7 +185,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Track the clip and print a summary."""
     from gait.body.measured import MeasuredBody
-    from gait.track.clip import ClipOptions, track_clip
+    from gait.track.clip import track_clip
     from gait.track.people import numbered, track_people
 
     if args.stop is not None:
@@ -193,8 +197,10 @@ def run(args: argparse.Namespace) -> int:
     if args.person and not args.keypoints:
         raise UsageError("--person: needs --keypoints")
     own_body = args.body == "auto"
-    if own_body and (len(args.video) < 2 or args.detector == "none" or args.mode == "paper"):
-        raise UsageError("--body auto: needs several films and the detector; give a file, or leave it out")
+    if own_body and ((args.detector == "none" and not args.keypoints) or args.mode == "paper"):
+        raise UsageError("--body auto: needs the detector or --keypoints; give a file, or leave it out")
+    if own_body and (args.draws or args.camera_path or args.stabilize == "auto"):
+        raise UsageError("--body auto: leave out --draws, --camera-path and --stabilize auto, or --body auto")
     if args.body and not own_body and args.height is not None:
         raise UsageError("--height: --body has the stature; leave out one of them")
     if args.people is not None:
@@ -255,13 +261,19 @@ def run(args: argparse.Namespace) -> int:
     given |= {"video": films[0], "camera": cameras[0] if cameras else None}
     given["further"] = tuple(zip(films[1:], cameras[1:], strict=True)) if films[1:] else ()
     if args.people is None:
-        summary = track_clip(ClipOptions(**given))
+        summary = track_clip(ClipOptions(**given), _half_lifted if own_body and len(films) == 1 else None)
         text = _text
     else:
         summary = track_people(ClipOptions(**given))
         text = _text_of_people
     print(json.dumps(summary) if args.json else text(summary))
     return 0 if summary["followed"] else 1
+
+
+def _half_lifted(options: ClipOptions, scene: Scene) -> Moved:
+    from gait.lift.tracked import half_lifted
+
+    return half_lifted(options, scene)
 
 
 def _cameras(args: argparse.Namespace) -> list[str]:

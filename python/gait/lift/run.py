@@ -64,6 +64,8 @@ class Request:
         Size of the video, to which a camera of another resolution is resized.
     calibration : Calibration, optional
         Camera estimated from the walk instead; its uncertainty is added to the standard deviations.
+    view : View, optional
+        View to use instead of one by `camera`, `calibration` or `axis`.
     axis : str, optional
         Direction of an orthographic view; by default level, with a slowly changing scale.
     metres : float, optional
@@ -89,6 +91,7 @@ class Request:
     camera: str | None = None
     size: tuple[int, int] | None = None
     calibration: Calibration | None = None
+    view: View | None = None
     axis: str | None = None
     metres: float | None = None
     ignore_unknown: bool = False
@@ -427,6 +430,8 @@ def measured_noise(keypoints: Keypoints, warn: Warn) -> float:
 
 def _view(keypoints: Keypoints, request: Request, warn: Warn) -> View:
     """Make the view of the keypoints; warn if they cannot be from the camera's picture."""
+    if request.view is not None:
+        return request.view
     if request.calibration is not None:
         return Perspective(request.calibration.camera)
     if request.camera:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from gait.track.clip_output import write
 from gait.track.first_state import first_state, start_in_keypoints
 from gait.track.follow import Follower
 from gait.track.further_cameras import require_cameras, with_further_cameras
+from gait.track.measured_joints import MeasuredJoints
 from gait.track.options import KEYPOINTS_SD, ClipOptions
 from gait.track.own_body import FirstPass, own_model
 from gait.track.person_keypoints import PersonKeypoints
@@ -33,7 +35,7 @@ from gait.track.read_scene import read_scene
 from gait.track.run_report import RunReport
 from gait.track.scene import Scene
 from gait.track.setup import setup
-from gait.track.standing import Sink
+from gait.track.standing import Moved, Sink
 from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
@@ -43,11 +45,14 @@ _OF_A_PASS = (
     "model", "init", "background", "height", "further", "offsets", "mode", "particles", "seed", "threads",
     "start", "stop", "detector",
 )  # fmt: skip
+JointsOf = Callable[[ClipOptions, Scene], Moved]
 _HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init with --overlay"
 
 
-def track_clip(options: ClipOptions) -> dict[str, Any]:
+def track_clip(options: ClipOptions, joints_of: JointsOf | None = None) -> dict[str, Any]:
     """Track and write the files; return the figures of ``gait track --json``.
+
+    `joints_of` makes, from a scene with one camera, what moves the joints of the estimates.
 
     Raises
     ------
@@ -56,9 +61,12 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     """
     require_cameras(options)
     scene = with_further_cameras(options, read_scene(options))
-    if options.own_body:
+    moved = None
+    if options.own_body and scene.further:
         scene = _with_own_body(options, scene)
-    return track_scene(options, scene, first_state(options, scene))
+    elif joints_of is not None:
+        moved = joints_of(options, scene)
+    return track_scene(options, scene, first_state(options, scene), moved=moved)
 
 
 def _with_own_body(options: ClipOptions, scene: Scene) -> Scene:
@@ -82,8 +90,18 @@ def _with_own_body(options: ClipOptions, scene: Scene) -> Scene:
     return replace(scene, model=own_model(options, scene, first))
 
 
-def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | None = None) -> dict[str, Any]:
-    """Track the person of a scene from a start; `also` receives those with the model's joints."""
+def track_scene(
+    options: ClipOptions,
+    scene: Scene,
+    start: Start,
+    also: Sink | None = None,
+    moved: Moved | None = None,
+) -> dict[str, Any]:
+    """Track the person of a scene from a start.
+
+    `also` receives the estimates, with the joints of the model's body; or `moved` moves these, by default to
+    where several cameras measure them.
+    """
     if options.background == "auto" and scene.empty is not None and (start.in_place or stays(scene)):
         scene = scene.without_plate()  # the median shows the person
     used = setup(options, scene, start, scene.empty is not None)
@@ -113,7 +131,9 @@ def track_scene(options: ClipOptions, scene: Scene, start: Start, also: Sink | N
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
     joints_found = keypoints if isinstance(keypoints, PersonKeypoints) else None
-    results = write(options, scene, tracker, found, plausibility, joints_found, also)
+    if moved is None and scene.further and joints_found is not None:
+        moved = MeasuredJoints(tracker.cameras, joints_found).moved
+    results = write(options, scene, tracker, found, plausibility, joints_found, also, moved)
     report = RunReport(options, scene, used, tracker.config.particles)
     for frame, x, y in results.starts[1:]:
         warning(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)

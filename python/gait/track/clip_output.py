@@ -24,13 +24,12 @@ from gait.progress import durations, progress
 from gait.report.drawing import LEGEND_SECONDS, Overlay
 from gait.report.film import Films, PageFilm
 from gait.track.from_walk import Calibration
-from gait.track.measured_joints import MeasuredJoints
 from gait.track.options import ClipOptions
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
 from gait.track.scene import Scene
 from gait.track.smooth import Smoother
-from gait.track.standing import Estimated, Sink, Standing
+from gait.track.standing import Estimated, Moved, Sink, Standing
 from gait.track.tracker import Tracker
 
 _HARDLY = 0.1  # share of the frames; a person followed in fewer was hardly followed
@@ -120,11 +119,12 @@ def write(
     plausibility: Plausibility,
     keypoints: PersonKeypoints | None,
     also: Sink | None = None,
+    moved: Moved | None = None,
 ) -> Results:
     """Write the estimates to all outputs, which appear together at the end.
 
-    Keypoints, if there are any, show in which frames the person takes no strides, and in several cameras
-    where the joints are.  If `also` is given, it receives all estimates, with the joints of the model's body.
+    Keypoints, if there are any, show in which frames the person takes no strides.  If `also` is given, it
+    receives all estimates, with the joints of the model's body; otherwise `moved` may move these.
     """
     model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
     with ExitStack() as stack:
@@ -156,8 +156,8 @@ def write(
             estimates = Standing(keypoints, tracker.model.directions).decided(estimates)
         if also is not None:
             estimates = _passed(estimates, also)
-        elif keypoints is not None and scene.further:
-            estimates = MeasuredJoints(tracker.cameras, keypoints).moved(estimates)
+        elif moved is not None:
+            estimates = moved(estimates)
         if not options.smooth:  # frames are tracked while earlier ones are written
             estimates = stack.enter_context(closing(ahead(estimates)))
         for frame, estimate in estimates:

@@ -47,7 +47,7 @@ class ClipOptions:
     body : MeasuredBody, optional
         The person's measured body, with the stature of `height`.
     own_body : bool
-        Whether the person's body is estimated from a first pass, which needs further films and keypoints.
+        Whether the person's body is estimated, from a first pass if there are further films; needs keypoints.
     mode : Mode
     particles : int, optional
     seed, threads : int

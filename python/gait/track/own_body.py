@@ -63,8 +63,8 @@ class FirstPass:
         self.numbers: list[list[int]] = []  # of the frame in each film; -1: none
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
-        """Take in an estimate, unless it is uncertain."""
-        if estimate.status == TrackStatus.TRACKING:
+        """Take in an estimate, unless it is uncertain or of a person who takes no strides."""
+        if estimate.status == TrackStatus.TRACKING and estimate.takes_strides:
             self.estimates.append(estimate)
             others = [-1 if view is None else view.number for view in frame.others]
             self.numbers.append([frame.number, *others])

@@ -16,6 +16,7 @@ from gait.track.options import ClipOptions
 from gait.track.scene import Scene
 from gait.track.stabilise import CameraTurns
 
+_OWN_BODY = {True: "from a first pass", False: "joints half-way to those lifted from the keypoints"}
 _BESIDE = {"init": "init.json", "camera": "camera.json"}
 
 
@@ -39,7 +40,7 @@ def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, st
         "stature given": "not given" if options.height is None else f"{options.height:.2f} m",
         "model": "the package's" if options.model is None else options.model,
         "body measured": "no" if options.body is None else options.body.source,
-        **({"body estimated": "from a first pass"} if options.own_body else {}),
+        **({"body estimated": _OWN_BODY[bool(options.further)]} if options.own_body else {}),
         "settings": "of the paper" if options.mode == Mode.PAPER else "default",
         "estimates": "each frame from the whole film (smoothed)"
         if options.smooth

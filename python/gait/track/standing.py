@@ -21,6 +21,7 @@ from gait.track.person_keypoints import PersonKeypoints
 
 Estimated = tuple[Frame, Estimate]
 Sink = Callable[[Frame, Estimate], None]
+Moved = Callable[[Iterable[Estimated]], Iterator[Estimated]]
 
 _STILL_S = 0.3  # seconds; longer than both feet are on the floor in a step
 _LEAST_ANKLE_SD = 0.01  # person's heights; least standard deviation of the position of a moving ankle
