@@ -86,9 +86,14 @@ class Plausibility:
                 self.restart()
             yield frame, self.judged(frame, estimate)
 
-    def doubted(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
-        """Yield judged estimates in order; those that led to the wrong way round become `ambiguous`."""
-        return doubted(found, WrongWay(self._keypoints, self.directions))
+    def doubted(
+        self, found: Iterable[tuple[Frame, Estimate]], before: float = 0.0
+    ) -> Iterator[tuple[Frame, Estimate]]:
+        """Yield judged estimates in order; those that led to the wrong way round become `ambiguous`.
+
+        These are the frames since the first doubt, and those up to `before` seconds earlier.
+        """
+        return doubted(found, WrongWay(self._keypoints, self.directions), before)
 
     def _walks(self, estimate: Estimate) -> bool:
         """Whether the stature is plausible and the last second's path agrees with strides and heading."""

@@ -23,7 +23,7 @@ _NOT_TURNED_S = 0.25  # of it, up to which they no longer do
 _FRAME_S = 0.1  # for which one frame of them counts at most
 _AGAINST = 0.3  # metres in the last second by which the pelvis moves against the strides, also on a treadmill
 _STRIDES = 0.2  # metres; shorter strides have no direction
-_LONGEST_S = 2.0  # seconds before for which frames in doubt wait
+_LONGEST_S = 2.0  # for which frames in doubt wait
 _TURNED = "the detected joints show the person facing the other way"
 _MOVES = "the person moves against the direction of the strides"
 
@@ -81,10 +81,13 @@ class WrongWay:
         return places[-1] - places[0], (velocities[1:] * np.diff(times)[:, None]).sum(axis=0)
 
 
-def doubted(found: Iterable[tuple[Frame, Estimate]], wrong_way: WrongWay) -> Iterator[tuple[Frame, Estimate]]:
+def doubted(
+    found: Iterable[tuple[Frame, Estimate]], wrong_way: WrongWay, before: float
+) -> Iterator[tuple[Frame, Estimate]]:
     """Yield the frames of a track in order; those that led to the wrong way round are `ambiguous` too.
 
-    These are the frames since the first doubt, up to `_LONGEST_S` before.  In doubt, frames wait that long.
+    These are the frames since the first doubt, and those up to `before` seconds earlier, but not more than
+    `_LONGEST_S` seconds.  Frames wait for so long.
     """
     held: deque[tuple[Frame, Estimate]] = deque()
     for frame, estimate in found:
@@ -96,7 +99,8 @@ def doubted(found: Iterable[tuple[Frame, Estimate]], wrong_way: WrongWay) -> Ite
         held.append((frame, estimate))
         if wrong_way.reason:
             held = deque((one, as_ambiguous(now, wrong_way.reason)) for one, now in held)
-        while held and (not wrong_way.doubtful or frame.time - held[0][0].time > _LONGEST_S):
+        wait = _LONGEST_S if wrong_way.doubtful else before
+        while held and frame.time - held[0][0].time >= wait:
             yield held.popleft()
     yield from held
 
