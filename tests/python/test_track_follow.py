@@ -430,7 +430,7 @@ def test_trunks_that_face_the_other_way_for_half_a_second_are_ambiguous(
 
 def ambiguous(plausible, found, before=0.0):
     """Frames of a track that are not `tracking`, once its later ones are known."""
-    judged = plausible.doubted(plausible.judged_later(found), before)
+    judged = plausible.known_later(plausible.judged_later(found), before)
     return [frame.number for frame, now in judged if now.status != TrackStatus.TRACKING]
 
 
@@ -444,16 +444,16 @@ def test_a_track_is_ambiguous_from_the_first_mirrored_trunk_that_led_to_it(of_si
 
 
 @pytest.mark.parametrize(("mirrored", "longest"), [(range(0), 0), (range(0, 60, 3), 32)])
-def test_only_frames_in_doubt_wait_and_for_two_seconds_at_most(of_sides, mirrored, longest):
+def test_frames_wait_only_if_anything_indicates_it_and_for_two_seconds_at_most(of_sides, mirrored, longest):
     plausible, rows = of_sides(np.pi / 2, swapped(), mirrored)
     given = iter([(frame._replace(time=frame.number / 16), now) for frame, now in rows])
-    waited = [59 - given.__length_hint__() - frame.number for frame, _ in plausible.doubted(given)]
+    waited = [59 - given.__length_hint__() - frame.number for frame, _ in plausible.known_later(given)]
     assert max(waited) == longest
 
 
 @pytest.mark.parametrize(("metres", "wanted"), [(-0.4, range(23, 60)), (-0.25, ()), (1.2, ())])
 def test_a_person_who_moves_against_the_strides_is_ambiguous(of_sides, metres, wanted):
-    """By more than 0.3 m in a second, as nobody does on a treadmill."""
+    """By more than 0.3 m in a second, unlike people on a treadmill."""
     plausible, rows = of_sides(0.0, swapped(), range(0))
     ahead = np.array([np.cos(rows[0][1].mean.heading), np.sin(rows[0][1].mean.heading), 0.0])
     found = [

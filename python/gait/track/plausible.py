@@ -12,7 +12,7 @@ from gait.bindings.estimate import Estimate
 from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
-from gait.track.wrong_way import WrongWay, as_ambiguous, doubted
+from gait.track.wrong_way import WrongWay, as_ambiguous, known_later
 
 _DEPARTURE = 0.6  # metres in one second by which the pelvis may depart from the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
@@ -86,14 +86,14 @@ class Plausibility:
                 self.restart()
             yield frame, self.judged(frame, estimate)
 
-    def doubted(
+    def known_later(
         self, found: Iterable[tuple[Frame, Estimate]], before: float = 0.0
     ) -> Iterator[tuple[Frame, Estimate]]:
         """Yield judged estimates in order; those that led to the wrong way round become `ambiguous`.
 
-        These are the frames since the first doubt, and those up to `before` seconds earlier.
+        These are the frames since anything indicated it, and those up to `before` seconds earlier.
         """
-        return doubted(found, WrongWay(self._keypoints, self.directions), before)
+        return known_later(found, WrongWay(self._keypoints, self.directions), before)
 
     def _walks(self, estimate: Estimate) -> bool:
         """Whether the stature is plausible and the last second's path agrees with strides and heading."""

@@ -1,7 +1,7 @@
 """Whether an estimate is the wrong way round: the person faces, or moves, against it.
 
 The last second of a track decides.  A detector confuses front and back in single frames, and the place of a
-person seen from the front is uncertain, so less evidence is only a doubt.
+person seen from the front is uncertain, so less evidence only indicates it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _NOT_TURNED_S = 0.25  # of it, up to which they no longer do
 _FRAME_S = 0.1  # for which one frame of them counts at most
 _AGAINST = 0.3  # metres in the last second by which the pelvis moves against the strides, also on a treadmill
 _STRIDES = 0.2  # metres; shorter strides have no direction
-_LONGEST_S = 2.0  # for which frames in doubt wait
+_LONGEST_S = 2.0  # for which frames wait if anything indicates it
 _TURNED = "the detected joints show the person facing the other way"
 _MOVES = "the person moves against the direction of the strides"
 
@@ -41,7 +41,7 @@ class WrongWay:
     ----------
     reason : str
         Why the last estimate is the wrong way round; empty if it is not.
-    doubtful : bool
+    indicated : bool
         Whether anything in the last second indicates it.
     """
 
@@ -53,7 +53,7 @@ class WrongWay:
     def restart(self) -> None:
         """Forget the last second, since the track starts again elsewhere."""
         self._second.clear()
-        self.reason, self.doubtful = "", False
+        self.reason, self.indicated = "", False
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
         """Add an estimate; the frames' times may decrease."""
@@ -72,7 +72,7 @@ class WrongWay:
             self.reason = _TURNED
         else:
             self.reason = _MOVES if length > _STRIDES and along < -_AGAINST * length else ""
-        self.doubtful = mirrored > 0.0 or along < 0.0
+        self.indicated = mirrored > 0.0 or along < 0.0
 
     def path(self) -> tuple[np.ndarray, np.ndarray]:
         """Return how far the pelvis moved in the last second, and how far strides lead, (2,) metres."""
@@ -81,13 +81,13 @@ class WrongWay:
         return places[-1] - places[0], (velocities[1:] * np.diff(times)[:, None]).sum(axis=0)
 
 
-def doubted(
+def known_later(
     found: Iterable[tuple[Frame, Estimate]], wrong_way: WrongWay, before: float
 ) -> Iterator[tuple[Frame, Estimate]]:
     """Yield the frames of a track in order; those that led to the wrong way round are `ambiguous` too.
 
-    These are the frames since the first doubt, and those up to `before` seconds earlier, but not more than
-    `_LONGEST_S` seconds.  Frames wait for so long.
+    These are the frames since anything indicated it, and those up to `before` seconds earlier, but not more
+    than `_LONGEST_S` seconds.  Frames wait for so long.
     """
     held: deque[tuple[Frame, Estimate]] = deque()
     for frame, estimate in found:
@@ -99,7 +99,7 @@ def doubted(
         held.append((frame, estimate))
         if wrong_way.reason:
             held = deque((one, as_ambiguous(now, wrong_way.reason)) for one, now in held)
-        wait = _LONGEST_S if wrong_way.doubtful else before
+        wait = _LONGEST_S if wrong_way.indicated else before
         while held and frame.time - held[0][0].time >= wait:
             yield held.popleft()
     yield from held
