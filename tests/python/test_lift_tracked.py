@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +24,8 @@ from gait.errors import UserError
 from gait.io import blob, keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_estimates
-from gait.lift.tracked import TrackedAndLifted, half_lifted
+from gait.lift.tracked import TrackedAndLifted, every_frame, half_lifted
+from gait.track.clip import track_clip
 from gait.track.options import ClipOptions
 
 MODEL = gait.Model()
@@ -47,11 +49,18 @@ def pose() -> tuple[Estimate, np.ndarray]:
     return estimate, np.array(person.pose(state)[0])
 
 
-def moved(estimate: Estimate, lifted: np.ndarray, number: int = 7) -> np.ndarray:
-    """Joints of an estimate of frame 7, of which `number` is lifted."""
+def keypoints(frames: int, seen: list[int]) -> Keypoints:
+    """Keypoints in some of `frames` frames, and rows without any in the others."""
+    uv = np.full((frames, len(NAMES), 2), np.nan)
+    uv[seen] = 100.0
+    return Keypoints(np.arange(frames), np.arange(frames) / 30, NAMES, uv, np.ones(uv.shape[:2]))
+
+
+def moved(estimate: Estimate, lifted: np.ndarray, number: int = 0) -> np.ndarray:
+    """Joints of an estimate of frame `number`, of which frame 0 is lifted."""
     motion = SimpleNamespace(names=NAMES, places=lifted[None])
-    mover = TrackedAndLifted(VIEW, np.array([number]), motion)
-    [(_, found)] = mover.moved([(SimpleNamespace(number=7), estimate)])
+    mover = TrackedAndLifted(VIEW, keypoints(1, [0]), motion)
+    [(_, found)] = mover.moved([(SimpleNamespace(number=number), estimate)])
     assert found.mean is estimate.mean and found.status == estimate.status
     return found.joints
 
@@ -80,12 +89,12 @@ def test_where_they_disagree_or_one_is_absent_the_joints_stay(
 ) -> None:
     estimate, person = pose
     if case == "legs swapped":
-        person = 2.5 * (person[other_sides(NAMES)] - person[0]) + person[0]
+        person = person[other_sides(NAMES)]
     if case == "no number":
         person = np.full_like(person, np.nan)
     if case == "lost":
         estimate = replace(estimate, status=TrackStatus.LOST)
-    joints = moved(estimate, person, 8 if case == "another frame" else 7)
+    joints = moved(estimate, person, 1 if case == "another frame" else 0)
     np.testing.assert_array_equal(joints, estimate.joints)
 
 
@@ -98,6 +107,35 @@ def test_the_weight_falls_gradually(pose: tuple[Estimate, np.ndarray]) -> None:
         lifted[HIPS] = estimate.joints[HIPS]
         shares.append(float(np.median((moved(estimate, lifted) - estimate.joints)[:, 1])) / off)
     np.testing.assert_allclose(shares, [0.5, 0.5, 0.25, 0.125, 0.0], atol=1e-6)
+
+
+def test_frames_without_keypoints_are_lifted_too_and_the_weight_falls_in_a_gap(
+    pose: tuple[Estimate, np.ndarray],
+) -> None:
+    """Keypoints in every second of 20 frames, then in none: the whole weight for 0.1 s, none after 0.3 s."""
+    estimate, person = pose
+    motion = SimpleNamespace(names=NAMES, places=np.repeat(person[None], 40, axis=0))
+    mover = TrackedAndLifted(VIEW, keypoints(40, list(range(0, 20, 2))), motion)
+    found = mover.moved((SimpleNamespace(number=number), estimate) for number in range(40))
+    knee = NAMES.index("l_knee")
+    moves = np.array([np.linalg.norm((now.joints - estimate.joints)[knee]) for _, now in found])
+    whole = moves[0]
+    np.testing.assert_allclose(moves[:22] / whole, 1.0)
+    assert np.all(np.diff(moves[21:28]) < 0) and np.all(moves[28:] == 0)
+
+
+def test_only_frames_to_track_and_a_second_around_are_lifted() -> None:
+    """In rows of their own, also where the file has none."""
+    given = keypoints(200, list(range(200))).part(slice(0, 200, 2))
+    found = every_frame(given, range(60, 90), np.arange(200) / 30)
+    assert set(range(31, 119)) <= set(found.frame.tolist()) <= set(range(30, 121))
+    assert found.visible.any(axis=1).tolist() == [number % 2 == 0 for number in found.frame.tolist()]
+    assert np.array_equal(found.time, found.frame / 30)
+
+
+def test_from_python_one_film_needs_the_lift() -> None:
+    with pytest.raises(ValueError, match="own_body: one film needs joints_of"):
+        track_clip(ClipOptions("walk.mp4", "camera.json", "track.csv", own_body=True))
 
 
 def test_moving_cameras_and_absent_people_are_one_line() -> None:
@@ -147,11 +185,16 @@ def test_a_person_with_other_knees_is_nearer(folder: Path, capsys: pytest.Captur
     """`gait track --body auto` of one film; without it the track is the same but for the joints."""
     words = ["track", folder / "walk.mp4", "--camera", folder / "camera.json", "--quiet", "--json"]
     words += ["--background", folder / "plate.png", "--keypoints", folder / "keypoints.csv", "--height", 1.75]
-    tracks = []
+    tracks, rows = [], []
     for name, more in (("plain", []), ("own", ["--body", "auto"])):
         assert main([str(word) for word in (*words, "-o", folder / f"{name}.csv", *more)]) == 0
         assert json.loads(capsys.readouterr().out)["followed"]
         tracks.append(read_estimates(folder / f"{name}.csv"))
+        with (folder / f"{name}.csv").open() as file:
+            rows.append(list(csv.DictReader(line for line in file if not line.startswith("#"))))
+    joints = {f"{name}_{axis}" for name in NAMES for axis in "xyz"}
+    for one, other in zip(*rows, strict=True):
+        assert {key for key in one if one[key] != other[key]} <= joints
     true = np.load(folder / "joints.npy")
     knees = [NAMES.index("l_knee"), NAMES.index("r_knee")]
     errors = []

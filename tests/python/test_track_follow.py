@@ -19,6 +19,7 @@ from gait.io import blob, keypoints_file, video
 from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.track import clip_keypoints
+from gait.track.clip_output import _without_pictures
 from gait.track.follow import Follower
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.plausible import Plausibility
@@ -331,6 +332,20 @@ def test_a_person_hidden_for_long_is_taken_up_again(astray):
     assert all(near[65:]) and "LOST" not in statuses[65:]
 
 
+def test_judging_forgets_a_track_backwards(astray, monkeypatch):
+    """When the track that was lost goes on, its last second is not that of the search backwards."""
+    events = []
+    judged, restart = Plausibility.judged, Plausibility.restart
+    monkeypatch.setattr(
+        Plausibility, "judged", lambda self, *row: (events.append(row[0].number), judged(self, *row))[1]
+    )
+    monkeypatch.setattr(Plausibility, "restart", lambda self: (events.append("restart"), restart(self))[1])
+    astray(0, range(20, 50), range(50, 65), 65)
+    pairs = zip(events, events[1:], strict=False)
+    steps = [abs(other - one) for one, other in pairs if "restart" not in (one, other)]
+    assert len(steps) > 80 and set(steps) == {1}
+
+
 def test_a_track_that_goes_astray_backwards_is_cut_and_the_person_searched_earlier(astray):
     starts, asked, near, _ = astray(99, range(79, 49, -1), range(49, 34, -1), 5)
     assert asked[0] == (0, 80)
@@ -428,9 +443,9 @@ def test_trunks_that_face_the_other_way_for_half_a_second_are_ambiguous(
     assert {judged[n].reason for n in found} <= {"the detected joints show the person facing the other way"}
 
 
-def ambiguous(plausible, found, before=0.0):
+def ambiguous(plausible, found, smooth=False):
     """Frames of a track that are not `tracking`, once its later ones are known."""
-    judged = plausible.known_later(plausible.judged_later(found), before)
+    judged = plausible.judged_later(found) if smooth else plausible.known_later(plausible._anew(found))
     return [frame.number for frame, now in judged if now.status != TrackStatus.TRACKING]
 
 
@@ -439,8 +454,8 @@ def test_a_track_is_ambiguous_from_the_first_mirrored_trunk_that_led_to_it(of_si
     """No second without mirrored trunks lies between."""
     plausible, rows = of_sides(np.pi / 2, swapped(), [*earlier, *range(44, 60)])
     assert ambiguous(plausible, rows) == list(range(first, 60))
-    assert ambiguous(plausible, rows, before=0.5) == list(range(max(first - 15, 0), 60))
-    assert ambiguous(plausible, rows[:59], before=0.5) == []
+    assert ambiguous(plausible, rows, smooth=True) == list(range(max(first - 30, 0), 60))
+    assert ambiguous(plausible, rows[:59], smooth=True) == []
 
 
 @pytest.mark.parametrize(("mirrored", "longest"), [(range(0), 0), (range(0, 60, 3), 32)])
@@ -451,19 +466,40 @@ def test_frames_wait_only_if_anything_indicates_it_and_for_two_seconds_at_most(o
     assert max(waited) == longest
 
 
-@pytest.mark.parametrize(("metres", "wanted"), [(-0.4, range(23, 60)), (-0.25, ()), (1.2, ())])
-def test_a_person_who_moves_against_the_strides_is_ambiguous(of_sides, metres, wanted):
-    """By more than 0.3 m in a second, unlike people on a treadmill."""
+@pytest.mark.parametrize(
+    ("metres", "speed", "wanted"),
+    [(-0.4, 1.2, range(23, 60)), (-0.4, 0.15, ()), (-0.25, 1.2, ()), (1.2, 1.2, ())],
+)
+def test_a_person_who_moves_against_the_strides_is_ambiguous(of_sides, metres, speed, wanted):
+    """By more than 0.3 m in a second, unlike people on a treadmill; strides below 0.2 m do not count."""
     plausible, rows = of_sides(0.0, swapped(), range(0))
-    ahead = np.array([np.cos(rows[0][1].mean.heading), np.sin(rows[0][1].mean.heading), 0.0])
-    found = [
-        (frame, replace(now, mean=replace(now.mean, pelvis=now.mean.pelvis + metres * frame.time * ahead)))
-        for frame, now in rows
-    ]
+    found = [(frame, ahead_by(metres * frame.time, replace(now, speed=speed))) for frame, now in rows]
     judged = [plausible.judged(*row) for row in found]
     assert [n for n, now in enumerate(judged) if now.status != TrackStatus.TRACKING] == list(wanted)
     assert {judged[n].reason for n in wanted} <= {"the person moves against the direction of the strides"}
-    assert ambiguous(plausible, found) == list(range(1, 60) if wanted else ())
+    later = ambiguous(plausible, found)
+    assert later == (list(range(later[0], 60)) if wanted else []) and (not wanted or later[0] < 8)
+
+
+def ahead_by(metres, estimate):
+    """Move an estimate along its heading."""
+    way = np.array([np.cos(estimate.mean.heading), np.sin(estimate.mean.heading), 0.0])
+    return replace(estimate, mean=replace(estimate.mean, pelvis=estimate.mean.pelvis + metres * way))
+
+
+def test_a_track_backwards_from_a_later_start_is_another_track(of_sides):
+    """A person who is found again further back did not move there."""
+    plausible, rows = of_sides(0.0, swapped(), range(0))
+    again = [(frame, ahead_by(-2.0, replace(now, frame=now.frame - 60))) for frame, now in rows[30:]]
+    assert {now.status for _, now in plausible.known_later(iter(rows[:30] + again))} == {TrackStatus.TRACKING}
+
+
+def test_frames_that_wait_have_no_pictures():
+    picture = Frame(3, 0.1, np.ones((4, 4, 3), np.uint8), plate=np.ones((4, 4, 3), np.uint8))
+    [(frame, estimate)] = _without_pictures([(picture._replace(others=(picture, None)), "estimate")])
+    assert (frame.number, frame.time, estimate) == (3, 0.1, "estimate")
+    assert frame.image.size == frame.others[0].image.size == 0 and frame.others[1] is None
+    assert frame.plate is frame.others[0].plate is None
 
 
 @pytest.mark.parametrize(("start", "wanted"), [(20, range(24, 40)), (30, ())])

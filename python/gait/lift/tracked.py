@@ -14,18 +14,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gait.bindings.abi import TrackStatus
+from gait.bindings.estimate import Estimate
 from gait.bindings.segment_prior import SegmentPrior
 from gait.camera.camera import Camera
 from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints
 from gait.lift.run import Request, lift_keypoints
 from gait.lift.segment.view import Perspective
 from gait.lift.smooth.motion import Motion
 from gait.lift.smooth.options import Options
+from gait.progress import warning
 from gait.track.options import ClipOptions
 from gait.track.scene import Scene
 from gait.track.standing import Estimated, Moved
@@ -36,6 +40,9 @@ _HALF = 0.5  # weight of a lifted joint
 #: Metres: median distance of the joints, with the hips aligned, up to which the weight is whole, and from
 #: which it is zero.  Errors of both make up 0.02 to 0.05.
 _AGREE, _DISAGREE = 0.08, 0.16
+#: Seconds from the nearest frame with keypoints, in the same way.
+_SEEN_S, _UNSEEN_S = 0.1, 0.3
+_MARGIN_S = 1.0  # before and after the frames to track, of keypoints that are lifted too
 _HIPS = ("l_hip", "r_hip")
 
 
@@ -46,40 +53,43 @@ class TrackedAndLifted:
     ----------
     camera : Camera
         One that stands still.
-    frames : (T,)
-        Numbers of the lifted frames, ascending.
+    keypoints : Keypoints
+        Those that were lifted.
     lifted : Motion
-        Their joints.
+        The joints in their frames.
     """
 
-    def __init__(self, camera: Camera, frames: NDArray[np.int64], lifted: Motion) -> None:
+    def __init__(self, camera: Camera, keypoints: Keypoints, lifted: Motion) -> None:
         self._camera, self._lifted = camera, lifted
-        self._row = {number: row for row, number in enumerate(frames.tolist())}
+        self._row = {number: row for row, number in enumerate(keypoints.frame.tolist())}
+        seen = keypoints.time[keypoints.visible.any(axis=1)]
+        away = np.abs(keypoints.time[:, None] - seen).min(axis=1, initial=np.inf)
+        self._seen = np.clip((_UNSEEN_S - away) / (_UNSEEN_S - _SEEN_S), 0.0, 1.0)
 
     def moved(self, found: Iterable[Estimated]) -> Iterator[Estimated]:
         """Yield the frames in order; lost and not lifted ones unchanged."""
         for frame, estimate in found:
             row = self._row.get(frame.number)
             if row is not None and estimate.status != TrackStatus.LOST:
-                joints = self._mean(estimate.joints, list(estimate.joint_names), self._lifted.places[row])
-                estimate = replace(estimate, joints=joints)
+                estimate = replace(estimate, joints=self._mean(estimate, row))
             yield frame, estimate
 
-    def _mean(self, joints: Array, names: list[str], lifted: Array) -> Array:
-        """Mean of the joints (J, 3) of an estimate and those of the lift, metres."""
+    def _mean(self, estimate: Estimate, row: int) -> Array:
+        """Mean of the joints (J, 3) of an estimate and those of a row of the lift, metres."""
+        joints, names, lifted = estimate.joints, list(estimate.joint_names), self._lifted.places[row]
         common = [name for name in self._lifted.names if name in names]
         ours = [names.index(name) for name in common]
         theirs = lifted[[self._lifted.names.index(name) for name in common]]
         hips = [common.index(name) for name in _HIPS]
         middle, other = joints[ours][hips].mean(axis=0), theirs[hips].mean(axis=0)
         apart = float(np.median(np.linalg.norm(joints[ours] - middle - theirs + other, axis=1)))
-        weight = _HALF * float(np.clip((_DISAGREE - apart) / (_DISAGREE - _AGREE), 0.0, 1.0))
+        agree = float(np.clip((_DISAGREE - apart) / (_DISAGREE - _AGREE), 0.0, 1.0))
         way = other - self._camera.centre
         depth, wanted = self._camera.depth(np.array([other, middle]))
         if not (np.isfinite(apart) and depth > 0):
             return joints
         out = joints.copy()
-        out[ours] += weight * (theirs + way * (wanted / depth - 1.0) - joints[ours])
+        out[ours] += _HALF * agree * self._seen[row] * (theirs + way * (wanted / depth - 1.0) - joints[ours])
         return out
 
 
@@ -98,18 +108,42 @@ def half_lifted(options: ClipOptions, scene: Scene) -> Moved:
     request = Request(
         Options(stature=options.height), view=Perspective(scene.camera), stabilised=True, hints=False
     )
+
+    def warn(words: str) -> None:
+        warning(f"--body auto: {words}", options.quiet)
+
     try:
-        lifted = lift_keypoints(
-            options.video,
-            scene.people[scene.person],
-            _prior(options.model),
-            request,
-            lambda _: None,
-            options.quiet,
-        )
+        keypoints = every_frame(scene.people[scene.person], scene.frames, scene.video.times)
+        prior = _prior(options.model)
+        lifted = lift_keypoints(options.video, keypoints, prior, request, warn, options.quiet)
     except UserError as error:
         raise UserError(f"{error}; or leave out --body auto") from None
-    return TrackedAndLifted(scene.camera, lifted.keypoints.frame, lifted.motion).moved
+    return TrackedAndLifted(scene.camera, lifted.keypoints, lifted.motion).moved
+
+
+def every_frame(keypoints: Keypoints, frames: range, times: Array) -> Keypoints:
+    """Return keypoints in every frame of a film that is to be tracked; those in between show nothing.
+
+    Parameters
+    ----------
+    keypoints : Keypoints
+    frames : range
+        Frames to track.
+    times : (N,)
+        Times of all frames of the film, seconds.
+    """
+    near = times[[frames.start, frames.stop - 1]] + np.array([-_MARGIN_S, _MARGIN_S])
+    first, stop = np.searchsorted(times, near, side="right").tolist()
+    number = np.arange(first, stop)
+    rows = keypoints.frame - first
+    used = (rows >= 0) & (rows < len(number))
+    columns: dict[str, Any] = {"frame": number, "time": times[number]}
+    for name in ("uv", "confidence", "sd", "lasting_sd", "frame_sd", "by_hand"):
+        if (values := getattr(keypoints, name)) is not None:
+            columns[name] = np.full((len(number), *values.shape[1:]), np.nan)
+            columns[name][rows[used]] = values[used]
+    columns["confidence"] = np.nan_to_num(columns["confidence"], nan=1.0)
+    return replace(keypoints, **columns)
 
 
 def _prior(model: str | None) -> SegmentPrior:

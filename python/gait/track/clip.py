@@ -52,13 +52,18 @@ _HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and 
 def track_clip(options: ClipOptions, joints_of: JointsOf | None = None) -> dict[str, Any]:
     """Track and write the files; return the figures of ``gait track --json``.
 
-    `joints_of` makes, from a scene with one camera, what moves the joints of the estimates.
+    `joints_of` makes, from a scene with one camera, what moves the joints of the estimates; `own_body` of one
+    film needs it.
 
     Raises
     ------
+    ValueError
+        If `own_body` is set for one film without `joints_of` (`gait.lift.tracked.half_lifted`).
     UserError
         If a file cannot be read, no person can be found to start with, or no frame can be tracked.
     """
+    if options.own_body and not options.further and joints_of is None:
+        raise ValueError("own_body: one film needs joints_of")
     require_cameras(options)
     scene = with_further_cameras(options, read_scene(options))
     moved = None

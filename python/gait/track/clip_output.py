@@ -32,7 +32,6 @@ from gait.track.smooth import Smoother
 from gait.track.standing import Estimated, Moved, Sink, Standing
 from gait.track.tracker import Tracker
 
-_BEFORE_S = 1.0  # of a smoothed track before anything indicates it, which are the wrong way round as well
 _HARDLY = 0.1  # share of the frames; a person followed in fewer was hardly followed
 
 
@@ -276,7 +275,7 @@ def _smoothed(
     frames: Iterable[Frame] = (frame for frame, _ in rows)
     if options.overlay or options.report:  # decode the pictures again
         frames = scene.video.frames(rows[0][0].number, rows[-1][0].number + 1)
-    judged = plausibility.known_later(plausibility.judged_later(rows), _BEFORE_S)
+    judged = plausibility.judged_later(rows)
     yield from ((frame, estimate) for frame, (_, estimate) in zip(frames, judged, strict=True))
     if options.draws:  # last, so that they are never left beside an unfinished track
         draws.write(options.draws)

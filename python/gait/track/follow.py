@@ -140,6 +140,7 @@ class Follower:
                 if found is not None:
                     following, more = self._earlier(found, range(frame.number + 1, frames.stop), stop)
                     before |= more
+                self._plausibility.restart()  # it has judged another track, if one was found
             estimate = replace(now, status=TrackStatus.LOST) if lost else now
             yield frame, before.get(frame.number, estimate) if lost else estimate
             anew = self._auto_start.find_lost(frame, estimate.status) if self._auto_start else None

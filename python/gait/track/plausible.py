@@ -16,6 +16,7 @@ from gait.track.wrong_way import WrongWay, as_ambiguous, known_later
 
 _DEPARTURE = 0.6  # metres in one second by which the pelvis may depart from the path of strides and heading
 _BEYOND = 4.0  # standard deviations from which a stature is implausible
+_BEFORE_S = 1.0  # seconds of a smoothed track before anything indicates the wrong way round
 _LEAST_SD = 0.05  # metres; least standard deviation of a stature
 _ELSEWHERE = "the person detected in the image does not match"
 _NO_WALK = "the path does not match the strides, or the stature is unusual"
@@ -78,22 +79,24 @@ class Plausibility:
             return estimate
         return as_ambiguous(estimate, _ELSEWHERE if agree is not None else _NO_WALK if supported else _UNSEEN)
 
+    def known_later(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
+        """Yield judged estimates in order; those that led to the wrong way round become `ambiguous`."""
+        return known_later(found, WrongWay(self._keypoints, self.directions), 0.0)
+
     def judged_later(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
-        """Judge the estimates of a whole track, in order."""
+        """Judge the estimates of a smoothed track, in order, and those that led to the wrong way round.
+
+        In such a track the second before anything indicates it is the wrong way round as well.
+        """
+        return known_later(self._anew(found), WrongWay(self._keypoints, self.directions), _BEFORE_S)
+
+    def _anew(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
+        """Judge the estimates of a track again."""
         self.restart()
         for frame, estimate in found:
             if estimate.frame == 0:  # a start
                 self.restart()
             yield frame, self.judged(frame, estimate)
-
-    def known_later(
-        self, found: Iterable[tuple[Frame, Estimate]], before: float = 0.0
-    ) -> Iterator[tuple[Frame, Estimate]]:
-        """Yield judged estimates in order; those that led to the wrong way round become `ambiguous`.
-
-        These are the frames since anything indicated it, and those up to `before` seconds earlier.
-        """
-        return known_later(found, WrongWay(self._keypoints, self.directions), before)
 
     def _walks(self, estimate: Estimate) -> bool:
         """Whether the stature is plausible and the last second's path agrees with strides and heading."""

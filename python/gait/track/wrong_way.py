@@ -22,6 +22,7 @@ _TURNED_S = 0.5  # of the last second, in which keypoints show the trunk facing 
 _NOT_TURNED_S = 0.25  # of it, up to which they no longer do
 _FRAME_S = 0.1  # for which one frame of them counts at most
 _AGAINST = 0.3  # metres in the last second by which the pelvis moves against the strides, also on a treadmill
+_INDICATES = 0.05  # metres of it that already indicate it
 _STRIDES = 0.2  # metres; shorter strides have no direction
 _LONGEST_S = 2.0  # for which frames wait if anything indicates it
 _TURNED = "the detected joints show the person facing the other way"
@@ -72,7 +73,7 @@ class WrongWay:
             self.reason = _TURNED
         else:
             self.reason = _MOVES if length > _STRIDES and along < -_AGAINST * length else ""
-        self.indicated = mirrored > 0.0 or along < 0.0
+        self.indicated = mirrored > 0.0 or along < -_INDICATES * length
 
     def path(self) -> tuple[np.ndarray, np.ndarray]:
         """Return how far the pelvis moved in the last second, and how far strides lead, (2,) metres."""
@@ -90,8 +91,10 @@ def known_later(
     than `_LONGEST_S` seconds.  Frames wait for so long.
     """
     held: deque[tuple[Frame, Estimate]] = deque()
+    backwards = False
     for frame, estimate in found:
-        if estimate.frame == 0:  # a start
+        before_start, backwards = backwards, estimate.frame < 0
+        if estimate.frame == 0 or backwards != before_start:  # another track begins
             yield from held
             held.clear()
             wrong_way.restart()
