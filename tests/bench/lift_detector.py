@@ -3,7 +3,8 @@
 
 make eval-lift, or lift_detector.py
 
-Development clips with all networks, films of real people with `full`.  Joints are kept in
+Development clips with all networks, with models learnt without their subjects; films of real people with
+`full`.  Joints are kept in
 build/detector-joints as the networks give them; each run moves them by the profile, as gait detect does.
 """
 
@@ -74,21 +75,21 @@ def lifted(
     return json.loads(done.stdout), cpu, len(done.stderr.splitlines())
 
 
-def row(clip: Path, network: str, folder: Path) -> list[object]:
-    """Measure one clip."""
+def row(clip: Path, network: str, folder: Path, model: Path | str = "walk") -> list[object]:
+    """Measure one clip with a model."""
     found = profile.corrected(joints(clip, network), network)
     meta = json.loads((clip / "meta.json").read_text(encoding="utf-8"))
     if "window" in meta:
         begin, end = np.searchsorted(found.frame, (meta["window"][0], meta["window"][1] + 1)).tolist()
         found = found.part(slice(begin, end))
     output = folder / "out.csv"
-    summary, cpu, warnings = lifted(found, clip / "camera.json", output)
+    summary, cpu, warnings = lifted(found, clip / "camera.json", output, "-m", model)
     stature = 100 * (float(summary["stature_m"] or np.nan) / meta["stature_m"] - 1)
     judged: list[float | None] = [None] * (4 + len(FLEXIONS))
     if (truth := clip / "truth.csv").is_file():
         judged[:3] = judge(output, truth)
         judged[4:] = more_flexed(output, truth)
-        lifted(found, clip / "camera.json", output, "--floor-sd", lift_tracks.FLOOR_KNOWN)
+        lifted(found, clip / "camera.json", output, "-m", model, "--floor-sd", lift_tracks.FLOOR_KNOWN)
         judged[3] = judge(output, truth)[2]
     return [len(found.time), stature, *judged, summary["swapped"], 150 * cpu / len(found.time), warnings]
 
@@ -129,7 +130,8 @@ def note(rows: list[list[Any]]) -> str:
     wrong = sum(row[1] in rendered and abs(row[HEAD.index("stature %")]) > 6 for row in rows)
     return (
         "`gait lift` with the joints of `gait detect`, all defaults, stature unknown. The rows are the "
-        "development clips with all networks (none of their people is in the detector's profile), then "
+        "development clips with all networks (none of their people is in the detector's profile, nor among "
+        "the learners of the model), then "
         "films of real people, whose cameras are guessed from an assumed stature: there the stature only "
         "shows how well the lift agrees with the camera. Coverage: share of coordinates in their 90 % "
         "intervals; target from 0.8 to 0.95. Floor known: the same with `--floor-sd "
@@ -150,13 +152,17 @@ def main() -> int:
     if not clips:
         print(f"eval-lift: {eval_clips.DATA} is not there, left out", file=sys.stderr)
         return 0
+    known, without = eval_clips.people()
+    models = {clip.folder: without[clip.subject or ""] for clip in known}
     jobs = [(network, clip) for network in LANDMARK_NETWORKS for clip in clips]
     jobs += [("full", film) for film in films]
     rows = []
     with tempfile.TemporaryDirectory() as folder, progress("clips", len(jobs)) as update:
         row(clips[0], "full", Path(folder))  # compiles what is not compiled yet
         for done, (network, clip) in enumerate(jobs, 1):
-            rows.append(["detector", clip.name, network, *row(clip, network, Path(folder))])
+            rows.append(
+                ["detector", clip.name, network, *row(clip, network, Path(folder), models.get(clip, "walk"))]
+            )
             update(done)
     table.publish("lift_detector", "Joints of the detector", HEAD, rows, f"{facts()}\n\n{note(rows)}")
     return 0

@@ -49,10 +49,10 @@ def pose() -> tuple[Estimate, np.ndarray]:
     return estimate, np.array(person.pose(state)[0])
 
 
-def keypoints(frames: int, seen: list[int]) -> Keypoints:
+def keypoints(frames: int, visible: list[int]) -> Keypoints:
     """Keypoints in some of `frames` frames, and rows without any in the others."""
     uv = np.full((frames, len(NAMES), 2), np.nan)
-    uv[seen] = 100.0
+    uv[visible] = 100.0
     return Keypoints(np.arange(frames), np.arange(frames) / 30, NAMES, uv, np.ones(uv.shape[:2]))
 
 

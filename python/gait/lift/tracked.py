@@ -41,7 +41,7 @@ _HALF = 0.5  # weight of a lifted joint
 #: which it is zero.  Errors of both make up 0.02 to 0.05.
 _AGREE, _DISAGREE = 0.08, 0.16
 #: Seconds from the nearest frame with keypoints, in the same way.
-_SEEN_S, _UNSEEN_S = 0.1, 0.3
+_VISIBLE_S, _HIDDEN_S = 0.1, 0.3
 _MARGIN_S = 1.0  # before and after the frames to track, of keypoints that are lifted too
 _HIPS = ("l_hip", "r_hip")
 
@@ -62,9 +62,9 @@ class TrackedAndLifted:
     def __init__(self, camera: Camera, keypoints: Keypoints, lifted: Motion) -> None:
         self._camera, self._lifted = camera, lifted
         self._row = {number: row for row, number in enumerate(keypoints.frame.tolist())}
-        seen = keypoints.time[keypoints.visible.any(axis=1)]
-        away = np.abs(keypoints.time[:, None] - seen).min(axis=1, initial=np.inf)
-        self._seen = np.clip((_UNSEEN_S - away) / (_UNSEEN_S - _SEEN_S), 0.0, 1.0)
+        visible = keypoints.time[keypoints.visible.any(axis=1)]
+        away = np.abs(keypoints.time[:, None] - visible).min(axis=1, initial=np.inf)
+        self._visible = np.clip((_HIDDEN_S - away) / (_HIDDEN_S - _VISIBLE_S), 0.0, 1.0)
 
     def moved(self, found: Iterable[Estimated]) -> Iterator[Estimated]:
         """Yield the frames in order; lost and not lifted ones unchanged."""
@@ -89,7 +89,9 @@ class TrackedAndLifted:
         if not (np.isfinite(apart) and depth > 0):
             return joints
         out = joints.copy()
-        out[ours] += _HALF * agree * self._seen[row] * (theirs + way * (wanted / depth - 1.0) - joints[ours])
+        out[ours] += (
+            _HALF * agree * self._visible[row] * (theirs + way * (wanted / depth - 1.0) - joints[ours])
+        )
         return out
 
 
