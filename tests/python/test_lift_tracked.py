@@ -49,6 +49,25 @@ def pose() -> tuple[Estimate, np.ndarray]:
     return estimate, np.array(person.pose(state)[0])
 
 
+@pytest.mark.parametrize(
+    ("turn_rate", "walks", "share"), [(-0.3, 1.0, 0.5), (0.4, 1.0, 0.0), (0.1, 0.3, 0.3)]
+)
+def test_only_people_who_walk_straight_on_are_moved(
+    pose: tuple[Estimate, np.ndarray], turn_rate: float, walks: float, share: float
+) -> None:
+    estimate, person = pose
+    knee = NAMES.index("l_knee")
+    whole = moved(estimate, person)[knee] - estimate.joints[knee]
+    turning = replace(
+        estimate,
+        mean=replace(estimate.mean, turn_rate=turn_rate),
+        class_probability=np.array([1.0 - walks, walks]),
+    )
+    found = moved(turning, person, classes=("run", "walk"))[knee] - estimate.joints[knee]
+    np.testing.assert_allclose(found, share * whole, atol=1e-9)
+    np.testing.assert_array_equal(moved(turning, person, classes=("run", "hop")), estimate.joints)
+
+
 def keypoints(frames: int, visible: list[int]) -> Keypoints:
     """Keypoints in some of `frames` frames, and rows without any in the others."""
     uv = np.full((frames, len(NAMES), 2), np.nan)
@@ -56,10 +75,12 @@ def keypoints(frames: int, visible: list[int]) -> Keypoints:
     return Keypoints(np.arange(frames), np.arange(frames) / 30, NAMES, uv, np.ones(uv.shape[:2]))
 
 
-def moved(estimate: Estimate, lifted: np.ndarray, number: int = 0) -> np.ndarray:
+def moved(
+    estimate: Estimate, lifted: np.ndarray, number: int = 0, classes: tuple[str, ...] = ("walk",)
+) -> np.ndarray:
     """Joints of an estimate of frame `number`, of which frame 0 is lifted."""
     motion = SimpleNamespace(names=NAMES, places=lifted[None])
-    mover = TrackedAndLifted(VIEW, keypoints(1, [0]), motion)
+    mover = TrackedAndLifted(VIEW, keypoints(1, [0]), motion, classes)
     [(_, found)] = mover.moved([(SimpleNamespace(number=number), estimate)])
     assert found.mean is estimate.mean and found.status == estimate.status
     return found.joints
@@ -152,7 +173,8 @@ def test_moving_cameras_and_absent_people_are_one_line() -> None:
     ("options", "words"),
     [
         (["--detector", "none"], "--body auto: needs the detector or --keypoints"),
-        (["--mode", "paper"], "--body auto: needs the detector or --keypoints"),
+        (["--mode", "paper"], "--body auto: paper mode uses no keypoints"),
+        (["--people", "2"], "--people: everyone has the model's body; leave out --body"),
         (["--smooth", "--draws", "d.npz"], "leave out --draws"),
         (["--stabilize", "auto"], "leave out --draws, --camera-path and --stabilize auto"),
     ],

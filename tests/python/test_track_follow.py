@@ -476,7 +476,7 @@ def test_a_person_who_moves_against_the_strides_is_ambiguous(of_sides, metres, s
     found = [(frame, ahead_by(metres * frame.time, replace(now, speed=speed))) for frame, now in rows]
     judged = [plausible.judged(*row) for row in found]
     assert [n for n, now in enumerate(judged) if now.status != TrackStatus.TRACKING] == list(wanted)
-    assert {judged[n].reason for n in wanted} <= {"the person moves against the direction of the strides"}
+    assert {judged[n].reason for n in wanted} <= {"the path leads against the direction of the strides"}
     later = ambiguous(plausible, found)
     assert later == (list(range(later[0], 60)) if wanted else []) and (not wanted or later[0] < 8)
 

@@ -197,7 +197,9 @@ def run(args: argparse.Namespace) -> int:
     if args.person and not args.keypoints:
         raise UsageError("--person: needs --keypoints")
     own_body = args.body == "auto"
-    if own_body and ((args.detector == "none" and not args.keypoints) or args.mode == "paper"):
+    if own_body and args.mode == "paper":
+        raise UsageError("--body auto: paper mode uses no keypoints; give a file, or leave out one of both")
+    if own_body and args.detector == "none" and not args.keypoints:
         raise UsageError("--body auto: needs the detector or --keypoints; give a file, or leave it out")
     if own_body and (args.draws or args.camera_path or args.stabilize == "auto"):
         raise UsageError("--body auto: leave out --draws, --camera-path and --stabilize auto, or --body auto")
@@ -205,10 +207,12 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--height: --body has the stature; leave out one of them")
     if args.people is not None:
         alone = {"--init": args.init != "auto", "--keypoints": args.keypoints, "--mode": args.mode == "paper"}
-        alone |= {"--detector none": args.detector == "none", "--body": args.body is not None}
+        alone |= {"--detector none": args.detector == "none"}
         for option, given in alone.items():
             if given:
                 raise UsageError(f"--people: needs the detector to find everyone; leave out {option}")
+        if args.body is not None:
+            raise UsageError("--people: everyone has the model's body; leave out --body")
     films = args.video
     cameras = _cameras(args)
     file = None if own_body else args.body

@@ -6,13 +6,14 @@ independently, so their mean is nearer to the person.  It contains part of the p
 posture, as far as one view shows them; the rest stays with the model and the prior of the segments.
 
 Each frame's lifted body is first moved along the line of sight to the depth of the tracker's, which also
-knows its size from the images.  Where the two disagree about the pose, as about left and right or when a
-person does not walk, the tracker's joints stay.
+knows its size from the images.  The segments are learnt from people who walk straight on, so the joints of
+other motion classes, of people who turn, and where the two disagree about the pose, as about left and right,
+are those of the tracker alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.motion_classes import WALKING
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
@@ -42,6 +44,8 @@ _HALF = 0.5  # weight of a lifted joint
 _AGREE, _DISAGREE = 0.08, 0.16
 #: Seconds from the nearest frame with keypoints, in the same way.
 _VISIBLE_S, _HIDDEN_S = 0.1, 0.3
+#: Turn rates, rad/s, in the same way.
+_STRAIGHT, _TURNS = 0.2, 0.4
 _MARGIN_S = 1.0  # before and after the frames to track, of keypoints that are lifted too
 _HIPS = ("l_hip", "r_hip")
 
@@ -57,14 +61,19 @@ class TrackedAndLifted:
         Those that were lifted.
     lifted : Motion
         The joints in their frames.
+    classes : sequence of str
+        Motion classes of the tracker's model.
     """
 
-    def __init__(self, camera: Camera, keypoints: Keypoints, lifted: Motion) -> None:
+    def __init__(
+        self, camera: Camera, keypoints: Keypoints, lifted: Motion, classes: Sequence[str] = (WALKING,)
+    ) -> None:
         self._camera, self._lifted = camera, lifted
+        self._walking = classes.index(WALKING) if WALKING in classes else None
         self._row = {number: row for row, number in enumerate(keypoints.frame.tolist())}
         visible = keypoints.time[keypoints.visible.any(axis=1)]
         away = np.abs(keypoints.time[:, None] - visible).min(axis=1, initial=np.inf)
-        self._visible = np.clip((_HIDDEN_S - away) / (_HIDDEN_S - _VISIBLE_S), 0.0, 1.0)
+        self._visible = _below(away, _VISIBLE_S, _HIDDEN_S)
 
     def moved(self, found: Iterable[Estimated]) -> Iterator[Estimated]:
         """Yield the frames in order; lost and not lifted ones unchanged."""
@@ -83,16 +92,21 @@ class TrackedAndLifted:
         hips = [common.index(name) for name in _HIPS]
         middle, other = joints[ours][hips].mean(axis=0), theirs[hips].mean(axis=0)
         apart = float(np.median(np.linalg.norm(joints[ours] - middle - theirs + other, axis=1)))
-        agree = float(np.clip((_DISAGREE - apart) / (_DISAGREE - _AGREE), 0.0, 1.0))
+        weight = _HALF * self._visible[row] * _below(apart, _AGREE, _DISAGREE)
+        weight *= _below(abs(estimate.mean.turn_rate), _STRAIGHT, _TURNS)
+        weight *= 0.0 if self._walking is None else estimate.class_probability[self._walking]
         way = other - self._camera.centre
         depth, wanted = self._camera.depth(np.array([other, middle]))
         if not (np.isfinite(apart) and depth > 0):
             return joints
         out = joints.copy()
-        out[ours] += (
-            _HALF * agree * self._visible[row] * (theirs + way * (wanted / depth - 1.0) - joints[ours])
-        )
+        out[ours] += weight * (theirs + way * (wanted / depth - 1.0) - joints[ours])
         return out
+
+
+def _below(values: Array | float, whole: float, none: float) -> Array:
+    """1 for values up to `whole`, 0 from `none` on, linear in between."""
+    return np.asarray(np.clip((none - np.asarray(values)) / (none - whole), 0.0, 1.0))
 
 
 def half_lifted(options: ClipOptions, scene: Scene) -> Moved:
@@ -120,7 +134,7 @@ def half_lifted(options: ClipOptions, scene: Scene) -> Moved:
         lifted = lift_keypoints(options.video, keypoints, prior, request, warn, options.quiet)
     except UserError as error:
         raise UserError(f"{error}; or leave out --body auto") from None
-    return TrackedAndLifted(scene.camera, lifted.keypoints, lifted.motion).moved
+    return TrackedAndLifted(scene.camera, lifted.keypoints, lifted.motion, scene.model.classes).moved
 
 
 def every_frame(keypoints: Keypoints, frames: range, times: Array) -> Keypoints:

@@ -66,12 +66,11 @@ def track_clip(options: ClipOptions, joints_of: JointsOf | None = None) -> dict[
         raise ValueError("own_body: one film needs joints_of")
     require_cameras(options)
     scene = with_further_cameras(options, read_scene(options))
-    moved = None
     if options.own_body and scene.further:
         scene = _with_own_body(options, scene)
-    elif joints_of is not None:
-        moved = joints_of(options, scene)
-    return track_scene(options, scene, first_state(options, scene), moved=moved)
+    start = first_state(options, scene)
+    moved = None if joints_of is None else joints_of(options, scene)
+    return track_scene(options, scene, start, moved=moved)
 
 
 def _with_own_body(options: ClipOptions, scene: Scene) -> Scene:

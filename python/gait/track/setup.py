@@ -16,7 +16,10 @@ from gait.track.options import ClipOptions
 from gait.track.scene import Scene
 from gait.track.stabilise import CameraTurns
 
-_OWN_BODY = {True: "from a first pass", False: "joints half-way to those lifted from the keypoints"}
+_OWN_BODY = {
+    True: "from a first pass",
+    False: "joints half-way to those lifted from the keypoints, while the person walks straight on",
+}
 _BESIDE = {"init": "init.json", "camera": "camera.json"}
 
 
@@ -27,6 +30,7 @@ def setup(options: ClipOptions, scene: Scene, start: Start, used: bool) -> dict[
         "background": _background(options, scene, used),
         "camera": _camera(options, scene),
         "joints found": _keypoints(options, scene),
+        **({"body estimated": _OWN_BODY[bool(options.further)]} if options.own_body else {}),
     }
     for (video, camera), began in zip(options.further, scene.began, strict=True):
         words |= {f"further film {video}": f"camera {camera}, {began}"}
@@ -40,7 +44,6 @@ def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, st
         "stature given": "not given" if options.height is None else f"{options.height:.2f} m",
         "model": "the package's" if options.model is None else options.model,
         "body measured": "no" if options.body is None else options.body.source,
-        **({"body estimated": _OWN_BODY[bool(options.further)]} if options.own_body else {}),
         "settings": "of the paper" if options.mode == Mode.PAPER else "default",
         "estimates": "each frame from the whole film (smoothed)"
         if options.smooth

@@ -21,12 +21,13 @@ from gait.track.person_shapes import PersonShapes
 _TURNED_S = 0.5  # of the last second, in which keypoints show the trunk facing the other way
 _NOT_TURNED_S = 0.25  # of it, up to which they no longer do
 _FRAME_S = 0.1  # for which one frame of them counts at most
-_AGAINST = 0.3  # metres in the last second by which the pelvis moves against the strides, also on a treadmill
+_AGAINST = 0.3  # metres in the last second by which the path leads against the strides, also on a treadmill
+_SURELY = 3.0  # standard deviations of the place along the strides that it must be as well
 _INDICATES = 0.05  # metres of it that already indicate it
 _STRIDES = 0.2  # metres; shorter strides have no direction
 _LONGEST_S = 2.0  # for which frames wait if anything indicates it
 _TURNED = "the detected joints show the person facing the other way"
-_MOVES = "the person moves against the direction of the strides"
+_AWAY = "the path leads against the direction of the strides"
 
 
 class WrongWay:
@@ -72,7 +73,8 @@ class WrongWay:
         if mirrored > (_NOT_TURNED_S if self.reason == _TURNED else _TURNED_S):
             self.reason = _TURNED
         else:
-            self.reason = _MOVES if length > _STRIDES and along < -_AGAINST * length else ""
+            least = max(_AGAINST * length, _SURELY * float(np.hypot(*(estimate.sd.pelvis[:2] * strides))))
+            self.reason = _AWAY if length > _STRIDES and along < -least else ""
         self.indicated = mirrored > 0.0 or along < -_INDICATES * length
 
     def path(self) -> tuple[np.ndarray, np.ndarray]:
