@@ -87,7 +87,8 @@ def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
     frames, height = scene.frames, options.height
     found = start_in_keypoints(scene, scene.person, frames.start, frames.stop, height)
     if found is not None:
-        return replace(found, source="the joints detected in the images")
+        given = "the joints detected in the images" if options.keypoints is None else options.keypoints
+        return replace(found, source=given)
     found = find_start(
         scene.video,
         scene.camera,
