@@ -71,8 +71,10 @@ class TrackedAndLifted:
         self._camera, self._lifted = camera, lifted
         self._walking = classes.index(WALKING) if WALKING in classes else None
         self._row = {number: row for row, number in enumerate(keypoints.frame.tolist())}
-        visible = keypoints.time[keypoints.visible.any(axis=1)]
-        away = np.abs(keypoints.time[:, None] - visible).min(axis=1, initial=np.inf)
+        time, visible = keypoints.time, keypoints.time[keypoints.visible.any(axis=1)]
+        bounds = np.concatenate([[-np.inf], visible, [np.inf]])
+        after = np.searchsorted(bounds, time)
+        away = np.minimum(bounds[after] - time, time - bounds[after - 1])
         self._visible = _below(away, _VISIBLE_S, _HIDDEN_S)
 
     def moved(self, found: Iterable[Estimated]) -> Iterator[Estimated]:
