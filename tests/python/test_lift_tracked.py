@@ -24,6 +24,7 @@ from gait.errors import UserError
 from gait.io import blob, keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_estimates
+from gait.lift import tracked
 from gait.lift.tracked import TrackedAndLifted, every_frame, half_lifted
 from gait.track.clip import track_clip
 from gait.track.options import ClipOptions
@@ -152,6 +153,22 @@ def test_only_frames_to_track_and_a_second_around_are_lifted() -> None:
     assert set(range(31, 119)) <= set(found.frame.tolist()) <= set(range(30, 121))
     assert found.visible.any(axis=1).tolist() == [number % 2 == 0 for number in found.frame.tolist()]
     assert np.array_equal(found.time, found.frame / 30)
+
+
+@pytest.mark.parametrize("fault", [{"wider": 2.0}, {"alone": True}, {"resized": 0.9}, {}])
+def test_a_lift_unlike_those_learnt_moves_nothing(
+    fault: dict[str, float], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = keypoints(30, list(range(30)))
+    motion = SimpleNamespace(**{"wider": 1.0, "alone": False, "resized": 1.0, **fault})
+    monkeypatch.setattr(tracked, "lift_keypoints", lambda *_: SimpleNamespace(motion=motion, keypoints=found))
+    scene = SimpleNamespace(
+        poses={}, people={0: found}, person=0, camera=VIEW, frames=range(30), model=MODEL,
+        video=SimpleNamespace(times=np.arange(30) / 30),
+    )  # fmt: skip
+    mover = half_lifted(ClipOptions("walk.mp4", "camera.json", "track.csv", own_body=True), scene)
+    assert (mover is iter) == bool(fault)
+    assert ("the joints are the tracker's alone" in capsys.readouterr().err) == bool(fault)
 
 
 def test_from_python_one_film_needs_the_lift() -> None:
