@@ -25,6 +25,7 @@ from gait.io import blob, keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_estimates
 from gait.lift import tracked
+from gait.lift.smooth.motion import Motion
 from gait.lift.tracked import TrackedAndLifted, every_frame, half_lifted
 from gait.track.clip import track_clip
 from gait.track.options import ClipOptions
@@ -160,7 +161,9 @@ def test_a_lift_unlike_those_learnt_moves_nothing(
     fault: dict[str, float], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = keypoints(30, list(range(30)))
-    motion = SimpleNamespace(**{"wider": 1.0, "alone": False, "resized": 1.0, **fault})
+    nothing = np.zeros(0)
+    fit = (nothing, nothing, nothing, nothing, 1.75, 3, True, 0.0, nothing)
+    motion = Motion(NAMES, *fit, **fault)
     monkeypatch.setattr(tracked, "lift_keypoints", lambda *_: SimpleNamespace(motion=motion, keypoints=found))
     scene = SimpleNamespace(
         poses={}, people={0: found}, person=0, camera=VIEW, frames=range(30), model=MODEL,

@@ -546,7 +546,7 @@ def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
     lost = _share_lost(found, keypoints, int(lifted.repairs["spikes"]))
     believed, sd = motion.believed_stature(options, prior_stature)
     off = abs(found.stature - believed) / sd if found.steps else 0.0  # single segments do not
-    strange = found.wider > 1 or found.alone or found.resized != 1 or off > UNUSUAL
+    strange = found.unlike or off > UNUSUAL
     one_view = not isinstance(lifted.view, Several)
     swapped = swaps.share_suspected(keypoints, options.pixel_sd) if strange and one_view else 0.0
     check = "the camera's focal length" if camera else "--metres-per-unit"

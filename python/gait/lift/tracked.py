@@ -138,15 +138,10 @@ def half_lifted(options: ClipOptions, scene: Scene) -> Moved:
         lifted = lift_keypoints(options.video, keypoints, prior, request, warn, options.quiet)
     except UserError as error:
         raise UserError(f"{error}; or leave out --body auto") from None
-    if unlike_those_learnt(lifted.motion):
+    if lifted.motion.unlike:
         warn("the motion is unlike those that lifts are learnt from; the joints are the tracker's alone")
         return iter
     return TrackedAndLifted(scene.camera, lifted.keypoints, lifted.motion, scene.model.classes).moved
-
-
-def unlike_those_learnt(motion: Motion) -> bool:
-    """Whether the keypoints do not fit the prior of a lift."""
-    return motion.wider > 1 or motion.alone or motion.resized != 1
 
 
 def every_frame(keypoints: Keypoints, frames: range, times: Array) -> Keypoints:

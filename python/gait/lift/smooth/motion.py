@@ -110,6 +110,11 @@ class Motion:
     state: State | None = None
     covariance: Floats | None = None
 
+    @property
+    def unlike(self) -> bool:
+        """Whether the motion is unlike those in training."""
+        return self.wider > 1 or self.alone or self.resized != 1
+
 
 class Unlike(UserError):
     """The keypoints show a motion unlike the prior's; a wider prior may help."""
