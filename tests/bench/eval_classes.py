@@ -41,7 +41,7 @@ from gait import Camera, Model, Start, Tracker, TrackerConfig, Video
 from gait.bindings.abi import TrackStatus
 from gait.bindings.model import read_cyclic
 from gait.body.motion_classes import STANDING, of_class
-from gait.body.skeleton import EVAL15
+from gait.body.skeleton import EVAL15, SIDES
 from gait.io import blob
 from gait.io.track_file import Joints, read_estimates, read_true_phase, read_truth
 from gait.io.video import read_plate
@@ -93,6 +93,7 @@ COLUMNS = (
     "tracking %",
     "far %",
     "wrong class %",
+    "a foot lifted %",
     "half a cycle off %",
     "foot m/s",
 )
@@ -109,6 +110,9 @@ detector and an automatic start, without and with --smooth, one seed; errors are
 - far: share of the frames with status `tracking` that are more than {1000 * FAR:.0f} mm off (root)
 - wrong class: share of the same frames with another class, later than {DELAY} s after a change, target below
   {100 * WRONG:.0f} %; - : the model has one class
+- a foot lifted: those of them in which a foot is truly off the floor (neither its heel nor its ball is slower
+  than {STANCE} m/s).  In the others a person who stops or starts is on both feet; the clips call this walking
+  as long as the stride rate is above a quarter of the usual one
 - half a cycle off: share of the same frames whose phase is nearer to half a cycle from the truth than to the
   truth, so that left and right are swapped; of those in which neither the person nor the estimate stands
 - foot: speed over the ground of the ankle of a foot that truly stands (slower than {STANCE} m/s), from frame
@@ -145,6 +149,7 @@ class Run:
     tracking: float  #: share of the frames
     far: float  #: share of the frames with status `tracking` whose error exceeds FAR
     wrong: float | None  #: share of the frames with status `tracking` in a wrong class; None: one class
+    lifted: float | None  #: share of the same frames in a wrong class while a foot is off the floor
     swapped: float | None  #: share of those, if both move, that are half a cycle off; None: there are none
     foot: float | None  #: m/s, median, of the ankle of a foot that stands; None: the person does not move
 
@@ -246,6 +251,7 @@ def _run(clip: Clip, source: str, seed: int) -> Run:
     late = (changed[shown] > 0) & (since * np.median(np.diff(truth.time)) < DELAY)
     reported = np.array(followed.motion_class)
     wrong = (reported != classes) & ~late
+    one_class = Path(source).stem in (MODELS[0], ALONE)
     off = followed.places - truth.eval15()[shown]
     absolute = np.linalg.norm(off, axis=2).mean(axis=1)
     root = np.linalg.norm(off - off[:, HIPS].mean(axis=1, keepdims=True), axis=2).mean(axis=1)
@@ -261,7 +267,8 @@ def _run(clip: Clip, source: str, seed: int) -> Run:
         coverage(followed.places, followed.sd, truth.eval15()[shown])["90"],
         float(under.sum() / count),
         float((root > FAR)[under].sum() / frames),
-        float(wrong[under].sum() / frames) if Path(source).stem not in (MODELS[0], ALONE) else None,
+        None if one_class else float(wrong[under].sum() / frames),
+        None if one_class else float((wrong & lifted(truth)[shown])[under].sum() / frames),
         phase_errors(followed.phase[judged], _phases(clip, truth)[shown][judged])["flips"]
         if judged.any()
         else None,
@@ -315,6 +322,16 @@ def _as_users(clip: Clip, source: str, seed: int) -> Followed:
     track = read_estimates(out)
     under = np.array([status == "tracking" for status in track.status])
     return Followed(track.frame, track.eval15(), track.eval15_sd(), under, track.motion_class, track.phase)
+
+
+def lifted(truth: Joints) -> NDArray[np.bool_]:
+    """Whether a foot is off the floor (n,): neither its heel nor its ball is slower than STANCE."""
+    slowest = []
+    for side in SIDES:
+        parts = [truth.places[f"{side}_{part}"] for part in ("heel", "toe")]
+        speeds = [np.linalg.norm(np.gradient(part, truth.time, axis=0), axis=1) for part in parts]
+        slowest.append(np.minimum(*speeds))
+    return np.asarray(np.maximum(*slowest) > STANCE)
 
 
 def foot_speed(followed: Followed, truth: Joints, moves: NDArray[np.bool_]) -> float | None:
@@ -408,6 +425,7 @@ def _rows(runs: list[Run]) -> Iterator[tuple[object, ...]]:
             if not these:
                 continue
             wrong = [run.wrong for run in these if run.wrong is not None]
+            lifts = [run.lifted for run in these if run.lifted is not None]
             swapped = [run.swapped for run in these if run.swapped is not None]
             feet = [run.foot for run in these if run.foot is not None]
             roots = [run.root for run in these]
@@ -423,6 +441,7 @@ def _rows(runs: list[Run]) -> Iterator[tuple[object, ...]]:
                 round(100 * float(np.mean([run.tracking for run in these]))),
                 round(100 * float(np.mean([run.far for run in these])), 1),
                 round(100 * float(np.mean(wrong)), 1) if wrong else None,
+                round(100 * float(np.mean(lifts)), 1) if lifts else None,
                 round(100 * float(np.mean(swapped)), 1) if swapped else None,
                 round(float(np.median(feet)), 2) if feet else None,
             )
