@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from gait.bindings.abi import Term
+from gait.bindings.abi import Mode, Term
 from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start, set_height
+from gait.bindings.model import SHIPPED
 from gait.bindings.start_fit import StartFit
 from gait.io.trc import write_trc
 from gait.io.video import Frame
@@ -46,6 +47,7 @@ _OF_A_PASS = (
     "start", "stop", "detector",
 )  # fmt: skip
 JointsOf = Callable[[ClipOptions, Scene], Moved]
+_OTHER_CLASSES = "the person seems to stand, run or walk backwards at times: track with -m classes"
 _HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init with --overlay"
 
 
@@ -142,6 +144,8 @@ def track_scene(
     for frame, x, y in results.starts[1:]:
         warning(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
     note("; ".join(results.coverage()), options.quiet)
+    if options.model in (None, SHIPPED[0]) and options.mode != Mode.PAPER and results.hardly_walks():
+        note(f"{options.output}: {_OTHER_CLASSES}", options.quiet)
     if results.hardly_followed():
         warning(f"{options.output}: {_HARDLY_FOLLOWED}")
     if options.trc:

@@ -31,8 +31,11 @@ from gait.track.scene import Scene
 from gait.track.smooth import Smoother
 from gait.track.standing import Estimated, Moved, Sink, Standing
 from gait.track.tracker import Tracker
+from gait.track.wrong_way import AGAINST_STRIDES
 
 _HARDLY = 0.1  # share of the frames; a person followed in fewer was hardly followed
+_RUNS = 2.2  # m/s; few people walk faster
+_OTHER_MOTION_S = 0.5  # seconds in which a person seems to do anything but walk, if they do
 
 
 class Results:
@@ -58,6 +61,7 @@ class Results:
         self.times: list[float] = []
         self.joints: list[np.ndarray[Any, Any]] = []
         self._frames: list[tuple[int, bool, bool]] = []  # number, whether lost, whether in the picture
+        self._not_walking: list[bool] = []  # whether the person stands, or moves against their strides
         self.starts: list[tuple[int, float, float]] = []
         self.film: PageFilm | None = None
 
@@ -75,6 +79,8 @@ class Results:
         self.joints.append(estimate.joints)
         shown = frame.camera(self._tracker.cameras[0]).shows(estimate.joints[:1])
         self._frames.append((frame.number, estimate.status == TrackStatus.LOST, shown))
+        stands, backwards = np.isnan(estimate.mean.phase), estimate.reason == AGAINST_STRIDES
+        self._not_walking.append(bool(stands or backwards))
 
     def coverage(self) -> list[str]:
         """Describe in which frames the person was followed, left the picture, or was lost."""
@@ -94,6 +100,18 @@ class Results:
         count, found = len(self._statuses), (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
         followed = sum(status in found for status in self._statuses)
         return self._statuses.count(TrackStatus.LOST) > count / 2 and followed < _HARDLY * count
+
+    def hardly_walks(self) -> bool:
+        """Whether a person tracked as walking seems to stand, run or walk backwards for half a second."""
+        times, places = np.array(self.times), np.array([joints[0, :2] for joints in self.joints])
+        lost = np.array([lost for _, lost, _ in self._frames])
+        if len(times) < 2:
+            return False
+        later = np.minimum(np.searchsorted(times, times + 1.0), len(times) - 1)
+        fast = np.linalg.norm(places[later] - places, axis=1) > _RUNS * (times[later] - times)
+        fast &= ~lost[later] & (times[later] - times >= 1.0 - 1e-6)
+        other = (fast | np.array(self._not_walking)) & ~lost
+        return bool(other.sum() * np.median(np.diff(times)) >= _OTHER_MOTION_S)
 
     def summary(self, threads: int, step_seconds: Sequence[float]) -> dict[str, Any]:
         """Return the figures of ``--json``; step_ms is only the time in gait_tracker_step."""

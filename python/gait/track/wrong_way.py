@@ -27,7 +27,8 @@ _INDICATES = 0.05  # metres of it that already indicate it
 _STRIDES = 0.2  # metres; shorter strides have no direction
 _LONGEST_S = 2.0  # for which frames wait if anything indicates it
 _TURNED = "the detected joints show the person facing the other way"
-_AWAY = "the path leads against the direction of the strides"
+#: Reason of an estimate that is `ambiguous`, as that of people who walk backwards.
+AGAINST_STRIDES = "the path leads against the direction of the strides"
 
 
 class WrongWay:
@@ -74,7 +75,7 @@ class WrongWay:
             self.reason = _TURNED
         else:
             least = max(_AGAINST * length, _SURELY * float(np.hypot(*(estimate.sd.pelvis[:2] * strides))))
-            self.reason = _AWAY if length > _STRIDES and along < -least else ""
+            self.reason = AGAINST_STRIDES if length > _STRIDES and along < -least else ""
         self.indicated = mirrored > 0.0 or along < -_INDICATES * length
 
     def path(self) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,50 @@
+"""What `gait track` reports about a clip as a whole."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gait.bindings.abi import TrackStatus
+from gait.track.clip_output import Results
+from gait.track.wrong_way import AGAINST_STRIDES
+
+RATE = 30.0  # frames per second
+IN_VIEW = SimpleNamespace(shows=lambda joints: True)
+WALKING: dict[str, Any] = {"status": TrackStatus.TRACKING, "phase": 0.2, "reason": "", "speed": 1.3}
+STANDING = {"phase": np.nan, "speed": 0.0}
+BACKWARDS = {"status": TrackStatus.AMBIGUOUS, "reason": AGAINST_STRIDES}
+RUNNING = {"speed": 2.6}
+
+
+def results(other: dict[str, Any], frames: int) -> Results:
+    """Results of 60 frames of a walk, then `frames` of another motion."""
+    found = Results(SimpleNamespace(cameras=[None]))  # type: ignore[arg-type]
+    place = 0.0
+    for number in range(60 + frames):
+        one = WALKING | (other if number >= 60 else {})
+        frame = SimpleNamespace(number=number, time=number / RATE, camera=lambda camera: IN_VIEW)
+        estimate = SimpleNamespace(
+            status=one["status"], joints=np.array([[place, 0.0, 0.9]]), frame=number,
+            mean=SimpleNamespace(phase=one["phase"]), reason=one["reason"],
+        )  # fmt: skip
+        found.add(frame, estimate)  # type: ignore[arg-type]
+        place += one["speed"] / RATE
+    return found
+
+
+@pytest.mark.parametrize(
+    "other, frames, hardly",
+    [
+        (WALKING, 60, False),
+        (STANDING, 12, False),
+        (STANDING, 18, True),
+        (BACKWARDS, 18, True),
+        (RUNNING, 60, True),
+        (RUNNING | {"status": TrackStatus.LOST}, 60, False),
+        (STANDING | {"status": TrackStatus.LOST}, 60, False),
+    ],
+)
+def test_half_a_second_of_another_motion_is_noticed(other, frames, hardly):
+    assert results(other, frames).hardly_walks() is hardly
