@@ -19,11 +19,11 @@ RUNNING = {"speed": 2.6}
 
 
 def results(other: dict[str, Any], frames: int) -> Results:
-    """Results of 60 frames of a walk, then `frames` of another motion."""
+    """Results of 60 frames of a walk, then `frames` of another motion, then 20 of the walk."""
     found = Results(SimpleNamespace(cameras=[None]))  # type: ignore[arg-type]
     place = 0.0
-    for number in range(60 + frames):
-        one = WALKING | (other if number >= 60 else {})
+    for number in range(60 + frames + 20):
+        one = WALKING | (other if 60 <= number < 60 + frames else {})
         frame = SimpleNamespace(number=number, time=number / RATE, camera=lambda camera: IN_VIEW)
         estimate = SimpleNamespace(
             status=one["status"], joints=np.array([[place, 0.0, 0.9]]), frame=number,
@@ -35,7 +35,7 @@ def results(other: dict[str, Any], frames: int) -> Results:
 
 
 @pytest.mark.parametrize(
-    "other, frames, hardly",
+    "other, frames, noticed",
     [
         (WALKING, 60, False),
         (STANDING, 12, False),
@@ -44,7 +44,8 @@ def results(other: dict[str, Any], frames: int) -> Results:
         (RUNNING, 60, True),
         (RUNNING | {"status": TrackStatus.LOST}, 60, False),
         (STANDING | {"status": TrackStatus.LOST}, 60, False),
+        (WALKING | {"status": TrackStatus.LOST, "speed": 90.0}, 3, False),  # found elsewhere
     ],
 )
-def test_half_a_second_of_another_motion_is_noticed(other, frames, hardly):
-    assert results(other, frames).hardly_walks() is hardly
+def test_half_a_second_of_another_motion_is_noticed(other, frames, noticed):
+    assert results(other, frames).not_only_walks() is noticed

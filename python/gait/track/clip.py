@@ -144,7 +144,7 @@ def track_scene(
     for frame, x, y in results.starts[1:]:
         warning(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
     note("; ".join(results.coverage()), options.quiet)
-    if options.model in (None, SHIPPED[0]) and options.mode != Mode.PAPER and results.hardly_walks():
+    if options.model in (None, SHIPPED[0]) and options.mode != Mode.PAPER and results.not_only_walks():
         note(f"{options.output}: {_OTHER_CLASSES}", options.quiet)
     if results.hardly_followed():
         warning(f"{options.output}: {_HARDLY_FOLLOWED}")

@@ -35,6 +35,7 @@ from gait.track.wrong_way import AGAINST_STRIDES
 
 _HARDLY = 0.1  # share of the frames; a person followed in fewer was hardly followed
 _RUNS = 2.2  # m/s; few people walk faster
+_WAY_S = 1.0  # seconds in which the way of a person shows that they run
 _OTHER_MOTION_S = 0.5  # seconds in which a person seems to do anything but walk, if they do
 
 
@@ -101,16 +102,18 @@ class Results:
         followed = sum(status in found for status in self._statuses)
         return self._statuses.count(TrackStatus.LOST) > count / 2 and followed < _HARDLY * count
 
-    def hardly_walks(self) -> bool:
+    def not_only_walks(self) -> bool:
         """Whether a person tracked as walking seems to stand, run or walk backwards for half a second."""
         times, places = np.array(self.times), np.array([joints[0, :2] for joints in self.joints])
         lost = np.array([lost for _, lost, _ in self._frames])
         if len(times) < 2:
             return False
-        later = np.minimum(np.searchsorted(times, times + 1.0), len(times) - 1)
-        fast = np.linalg.norm(places[later] - places, axis=1) > _RUNS * (times[later] - times)
-        fast &= ~lost[later] & (times[later] - times >= 1.0 - 1e-6)
-        other = (fast | np.array(self._not_walking)) & ~lost
+        later = np.searchsorted(times, times + _WAY_S)
+        whole, later = later < len(times), np.minimum(later, len(times) - 1)
+        runs = np.linalg.norm(places[later] - places, axis=1) > _RUNS * (times[later] - times)
+        losses = np.cumsum(lost)
+        runs &= whole & (losses[later] == losses)  # where the person is found again, the place may jump
+        other = (runs | np.array(self._not_walking)) & ~lost
         return bool(other.sum() * np.median(np.diff(times)) >= _OTHER_MOTION_S)
 
     def summary(self, threads: int, step_seconds: Sequence[float]) -> dict[str, Any]:
