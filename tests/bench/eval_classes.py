@@ -7,10 +7,10 @@ The clips are presets of `gait simulate`, with further seeds of the person; the 
 `eval_simulated`; and the development clips.  The models are those of the package: walk; classes, which walks,
 stands, walks backwards and runs; and, where people only walk, the walk of classes alone, which is learnt from
 people of seven sources instead of CMU's.  A start is the truth with the noise of `eval_clips`; it does not
-state the class.  Clips of `gait simulate` are also tracked as users do it, by `gait track -m classes` with
-the detector and an automatic start, and with --smooth.  The outdoor film is judged by joints marked in the
-picture.  The time of a step is compared between the package's walk, the same walk with standing and walking
-backwards added, and classes.
+state the class.  Clips of `gait simulate` are also tracked as users do it, by `gait track` with the detector
+and an automatic start, without -m, with `-m classes`, and with --smooth.  The outdoor film is judged by
+joints marked in the picture.  The time of a step is compared between the package's walk, the same walk with
+standing and walking backwards added, and classes.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 from gait import Camera, Model, Start, Tracker, TrackerConfig, Video
 from gait.bindings.abi import TrackStatus
 from gait.bindings.model import read_cyclic
-from gait.body.motion_classes import STANDING, of_class
+from gait.body.motion_classes import STANDING, WALKING, of_class
 from gait.body.skeleton import EVAL15, SIDES
 from gait.io import blob
 from gait.io.track_file import Joints, read_estimates, read_true_phase, read_truth
@@ -55,10 +55,11 @@ ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "eval-classes"
 MODELS = "walk", "classes"  # of the package
 ALONE = "walk of classes"
-USERS = {
-    "classes, users": (),
-    "classes, --smooth": ("--smooth",),
-}  # further options of `gait track -m classes`
+USERS: dict[str, tuple[str, ...]] = {
+    "default, users": (),
+    "classes, users": ("-m", "classes"),
+    "classes, --smooth": ("-m", "classes", "--smooth"),
+}  # further options of `gait track`
 RUNNING = "running"  # clip of eval_simulated
 TIMED = "walk"  # a clip that all models follow: a tracker that searches for a person has twice the particles
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
@@ -101,8 +102,10 @@ _READING = f"""\
 Clips of `gait simulate`, and the development clips (names with a number), whose people are among those that
 all models were learnt from.  The start is the truth with noise and does not state the class, so people who
 stand or walk backwards are tracked as walking for the first frames.  {ALONE}: the same model without its
-other classes.  {" and ".join(USERS)}: as users track, with `gait track -m classes`, the camera, the
-detector and an automatic start, without and with --smooth, one seed; errors are those of frames in the track.
+other classes.  {", ".join(USERS)}: as users track, with `gait track`, the camera, the
+detector and an automatic start, one seed: without -m, which tracks with walk and, if that does not follow
+the person, again with classes; with `-m classes`; and with --smooth too.  Errors are those of frames in
+the track.
 
 - root: error with the hips aligned, median over frames, then over seeds; abs: error without alignment
 - verdict, of the clips of `gait simulate`: reached, or what misses its target
@@ -313,15 +316,16 @@ def _from_truth(clip: Clip, source: str, seed: int) -> Followed:
 
 
 def _as_users(clip: Clip, source: str, seed: int) -> Followed:
-    """Track a clip with `gait track -m classes`, as in `USERS`."""
-    out = OUT / f"{clip.name}.{'smooth' if USERS[source] else 'users'}.{seed}.csv"
-    words = ["track", clip.video, "--camera", clip.camera, "-m", "classes", "--seed", seed, "-o", out]
+    """Track a clip with `gait track`, as in `USERS`."""
+    out = OUT / f"{clip.name}.{source.replace(', ', '.')}.{seed}.csv"
+    words = ["track", clip.video, "--camera", clip.camera, "--seed", seed, "-o", out]
     subprocess.run(
         [sys.executable, "-m", "gait", *map(str, words), *USERS[source]], check=True, capture_output=True
     )
     track = read_estimates(out)
     under = np.array([status == "tracking" for status in track.status])
-    return Followed(track.frame, track.eval15(), track.eval15_sd(), under, track.motion_class, track.phase)
+    classes = list(track.motion_class) or [WALKING] * len(track.frame)
+    return Followed(track.frame, track.eval15(), track.eval15_sd(), under, classes, track.phase)
 
 
 def lifted(truth: Joints) -> NDArray[np.bool_]:

@@ -31,6 +31,7 @@ SUMMARY = [
     "ambiguous",
     "lost",
     "followed",
+    "walks",
     "memory_bytes",
     "digest",
     "verdict",

@@ -48,4 +48,9 @@ def results(other: dict[str, Any], frames: int) -> Results:
     ],
 )
 def test_half_a_second_of_another_motion_is_noticed(other, frames, noticed):
-    assert results(other, frames).not_only_walks() is noticed
+    assert results(other, frames).walks() is not noticed
+
+
+@pytest.mark.parametrize("frames, noticed", [(20, False), (70, False), (90, True)])
+def test_a_person_who_is_hardly_ever_tracked_is_noticed(frames, noticed):
+    assert results({"status": TrackStatus.AMBIGUOUS}, frames).walks() is not noticed

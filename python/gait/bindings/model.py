@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 #: Models in the package by name: the default; that of Ormoneit and others (2000), for paper mode; one with
 #: the motion classes walking, standing, walking backwards and running, from several laboratories.
-SHIPPED = ("walk", "paper", "classes")
+WALK, PAPER, CLASSES = SHIPPED = "walk", "paper", "classes"
 NOT_CYCLIC = "contains no cyclic model; learn it without --segments only"
 
 
@@ -238,7 +238,7 @@ def pose_c(pose: CameraPose) -> abi.CameraPoseC:
 
 def model_file(path: str | os.PathLike[str] | None) -> Path:
     """Return the path of a blob file, or of a blob of the package by its name; a file comes first."""
-    name = SHIPPED[0] if path is None else str(path)
+    name = WALK if path is None else str(path)
     if path is not None and (name not in SHIPPED or Path(path).is_file()):
         return Path(path)
     shipped = Path(str(resources.files("gait") / "data" / f"{name}.gait"))

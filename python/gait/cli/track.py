@@ -28,6 +28,10 @@ the column person, in --json and above the heads in the overlay.  People found b
 the command states when and where they are in view.  --height is the stature of the person in view longest and
 tallest or, without --camera, of the first in that order whose walk determines the camera.
 
+Without -m the film is tracked with the model walk, which knows only walking.  If the person seems to stand,
+run or walk backwards for half a second, or less than half of 3 s or more are `tracking`, it is tracked again
+with the model classes, which knows these motions too.
+
 --keypoints adds joints that a detector has found in the frames, in the formats that gait lift reads.  Joints
 that the model does not have are ignored; frames may be missing.
 
@@ -103,7 +107,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also write the camera of each frame, if it moves",
     )
     add("-o", "--output", required=True, type=values.named(".csv"), metavar="OUT.csv", help="the track")
-    values.add_model(parser)
+    default = "default: walk, then classes if that does not follow the person; in paper mode paper"
+    values.add_model(parser, default=default)
     values.add_clip(parser, "track")
     add(
         "--body",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from gait.bindings.model import SHIPPED, read_cyclic
+from gait.bindings.model import SHIPPED, WALK, read_cyclic
 from gait.body.motion_classes import class_names
 from gait.errors import UserError
 from gait.io.track_file import Track
@@ -19,7 +19,7 @@ def model_for(track: Track, path: str | os.PathLike[str], given: str | None) -> 
     if given is not None:
         return given
     if not track.classes:
-        return SHIPPED[0]
+        return WALK
     for name in SHIPPED:
         if tuple(class_names(read_cyclic(name))) == track.classes:
             return name

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from gait.bindings.model import SHIPPED
+from gait.bindings.model import WALK
 from gait.io.track_file import Track
 from gait.motion.footfalls import STRIKE_SIDES, Events
 from gait.motion.norms import Compared
@@ -63,7 +63,7 @@ def add_gait(page: Page, track: Track, parameters: Parameters, cycles: Mapping[s
 def norm_people(model: str | None, parameters: Parameters) -> str:
     """Name the people who are the norm: of a model (None: the package's), of a class if it has several."""
     of_class = f", class {parameters.motion_class}" if parameters.motion_class else ""
-    return f"norm: the people of the model {model or SHIPPED[0]}{of_class}"
+    return f"norm: the people of the model {model or WALK}{of_class}"
 
 
 def add_norms(page: Page, norms: Sequence[Compared]) -> None:

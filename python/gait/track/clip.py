@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from gait.bindings.abi import Mode, Term
+from gait.bindings.abi import Term
 from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start, set_height
-from gait.bindings.model import SHIPPED
+from gait.bindings.model import CLASSES, WALK
 from gait.bindings.start_fit import StartFit
+from gait.errors import UserError
 from gait.io.trc import write_trc
 from gait.io.video import Frame
 from gait.progress import note, progress, warning
@@ -32,7 +33,7 @@ from gait.track.own_body import FirstPass, own_model
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
 from gait.track.plausible import Plausibility
-from gait.track.read_scene import read_scene
+from gait.track.read_scene import read_scene, tracker_model
 from gait.track.run_report import RunReport
 from gait.track.scene import Scene
 from gait.track.setup import setup
@@ -47,13 +48,14 @@ _OF_A_PASS = (
     "start", "stop", "detector",
 )  # fmt: skip
 JointsOf = Callable[[ClipOptions, Scene], Moved]
-_OTHER_CLASSES = "the person seems to stand, run or walk backwards at times: track with -m classes"
+_NOT_WALKING = "the person seems not to walk ahead all the time"
 _HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init with --overlay"
 
 
 def track_clip(options: ClipOptions, joints_of: JointsOf | None = None) -> dict[str, Any]:
     """Track and write the files; return the figures of ``gait track --json``.
 
+    Unless a model is given, a person who does not only walk is tracked again with that of motion classes.
     `joints_of` makes, from a scene with one camera, what moves the joints of the estimates; `own_body` of one
     film needs it.
 
@@ -68,11 +70,38 @@ def track_clip(options: ClipOptions, joints_of: JointsOf | None = None) -> dict[
         raise ValueError("own_body: one film needs joints_of")
     require_cameras(options)
     scene = with_further_cameras(options, read_scene(options))
-    if options.own_body and scene.further:
-        scene = _with_own_body(options, scene)
-    start = first_state(options, scene)
-    moved = None if joints_of is None else joints_of(options, scene)
-    return track_scene(options, scene, start, moved=moved)
+
+    def track(options: ClipOptions, scene: Scene) -> dict[str, Any]:
+        if options.own_body and scene.further:
+            scene = _with_own_body(options, scene)
+        start = first_state(options, scene)
+        moved = None if joints_of is None else joints_of(options, scene)
+        return track_scene(options, scene, start, moved=moved)
+
+    return track_all_motions(options, scene, track)
+
+
+def track_all_motions(
+    options: ClipOptions, scene: Scene, track: Callable[[ClipOptions, Scene], dict[str, Any]]
+) -> dict[str, Any]:
+    """Track with the model of `options` or, without one, with the first that follows the person.
+
+    The default model knows only walking.  If that does not follow what the person does, the scene is tracked
+    again with the model of motion classes, unless no start is found with it.
+    """
+    figures = track(options, scene)
+    if figures["walks"] or options.model_name != WALK:
+        return figures
+    if options.model is not None:
+        note(f"{options.output}: {_NOT_WALKING}: track with -m {CLASSES}", options.quiet)
+        return figures
+    note(f"{options.output}: {_NOT_WALKING}: tracking again with -m {CLASSES}", options.quiet)
+    options = replace(options, model=CLASSES)
+    try:
+        return track(options, replace(scene, model=tracker_model(options)))
+    except UserError as error:
+        warning(f"{options.output}: tracked as walking only: {error}", options.quiet)
+        return figures
 
 
 def _with_own_body(options: ClipOptions, scene: Scene) -> Scene:
@@ -144,8 +173,6 @@ def track_scene(
     for frame, x, y in results.starts[1:]:
         warning(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
     note("; ".join(results.coverage()), options.quiet)
-    if options.model in (None, SHIPPED[0]) and options.mode != Mode.PAPER and results.not_only_walks():
-        note(f"{options.output}: {_OTHER_CLASSES}", options.quiet)
     if results.hardly_followed():
         warning(f"{options.output}: {_HARDLY_FOLLOWED}")
     if options.trc:
@@ -156,7 +183,8 @@ def track_scene(
         report.write(options.report, results.film)
     camera = {} if scene.calibration is None else {"camera": scene.calibration.figures()}
     began = {"offsets_s": list(scene.offsets)} if scene.further else {}
-    return results.summary(options.threads, follower.step_seconds) | camera | began | report.figures()
+    counted = results.summary(options.threads, follower.step_seconds)
+    return counted | camera | began | report.figures()
 
 
 def _stature(options: ClipOptions, scene: Scene, start: Start) -> tuple[float, float]:

@@ -34,6 +34,8 @@ from gait.track.tracker import Tracker
 from gait.track.wrong_way import AGAINST_STRIDES
 
 _HARDLY = 0.1  # share of the frames; a person followed in fewer was hardly followed
+_FOLLOWED = 0.5  # share of the frames; of a person who walks more are `tracking`
+_ENOUGH_S = 3.0  # seconds after which that holds; a track may need one to settle
 _RUNS = 2.2  # m/s; few people walk faster
 _WAY_S = 1.0  # seconds in which the way of a person shows that they run
 _OTHER_MOTION_S = 0.5  # seconds in which a person seems to do anything but walk, if they do
@@ -102,11 +104,18 @@ class Results:
         followed = sum(status in found for status in self._statuses)
         return self._statuses.count(TrackStatus.LOST) > count / 2 and followed < _HARDLY * count
 
-    def not_only_walks(self) -> bool:
-        """Whether a person tracked as walking seems to stand, run or walk backwards for half a second."""
+    def walks(self) -> bool:
+        """Whether a model of walking follows what the person does.
+
+        It does not if the person seems to stand, run or walk backwards for half a second, or if less than
+        half of the frames are `tracking`, unless there are too few to know.
+        """
         times, places = np.array(self.times), np.array([joints[0, :2] for joints in self.joints])
         lost = np.array([lost for _, lost, _ in self._frames])
         if len(times) < 2:
+            return True
+        tracking = self._statuses.count(TrackStatus.TRACKING)
+        if times[-1] - times[0] > _ENOUGH_S and tracking < _FOLLOWED * len(times):
             return False
         later = np.searchsorted(times, times + _WAY_S)
         whole, later = later < len(times), np.minimum(later, len(times) - 1)
@@ -114,7 +123,7 @@ class Results:
         losses = np.cumsum(lost)
         runs &= whole & (losses[later] == losses)  # where the person is found again, the place may jump
         other = (runs | np.array(self._not_walking)) & ~lost
-        return bool(other.sum() * np.median(np.diff(times)) >= _OTHER_MOTION_S)
+        return bool(other.sum() * np.median(np.diff(times)) < _OTHER_MOTION_S)
 
     def summary(self, threads: int, step_seconds: Sequence[float]) -> dict[str, Any]:
         """Return the figures of ``--json``; step_ms is only the time in gait_tracker_step."""
@@ -127,6 +136,7 @@ class Results:
             "wall_fps": self._count / self._wall,
             **{status.name.lower(): self._statuses.count(status) for status in TrackStatus},
             "followed": not self.hardly_followed(),
+            "walks": self.walks(),
             "memory_bytes": tracker.memory_bytes,
             "digest": f"{tracker.digest():016x}",
         }

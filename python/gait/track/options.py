@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from gait.bindings.abi import Mode
+from gait.bindings.model import PAPER, WALK
 
 if TYPE_CHECKING:
     from gait.body.measured import MeasuredBody
@@ -39,7 +40,8 @@ class ClipOptions:
     fov : float, optional
         Horizontal field of view, degrees, if the camera is estimated.
     model : str, optional
-        By default the package's: ``walk``, or in paper mode ``paper``.
+        By default the package's: in paper mode ``paper``, otherwise ``walk``, or ``classes`` if that does not
+        follow the person.
     init, background : str
         A file, ``auto``, or for the background ``none``.
     height : float, optional
@@ -109,6 +111,11 @@ class ClipOptions:
     trc: str | None = None
     report: str | None = None
     quiet: bool = False
+
+    @property
+    def model_name(self) -> str:
+        """Model to track with, at first if none is given."""
+        return self.model or (PAPER if self.mode == Mode.PAPER else WALK)
 
     @property
     def network(self) -> str:

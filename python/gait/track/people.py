@@ -28,7 +28,7 @@ from gait.report.colours import PERSON_COLOURS
 from gait.report.drawing import Overlay
 from gait.report.film import Films, PageFilm
 from gait.report.people_page import Person, people_page
-from gait.track.clip import track_scene
+from gait.track.clip import track_all_motions, track_scene
 from gait.track.clip_background import require_scene
 from gait.track.first_state import start_in_keypoints
 from gait.track.options import ClipOptions
@@ -40,6 +40,8 @@ Array = NDArray[np.float64]
 
 MOST_PEOPLE = 8
 """Most people tracked in one clip."""
+
+_NO_WALK = "no second in which they walk in full view"
 
 Estimates = dict[int, Estimate]
 
@@ -66,9 +68,8 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
     for id, start in starts.items():
         note(f"person {id}", options.quiet)
         own = _scene_of(scene, id, list(starts), outlines)
-        found[id] = {}
         first = id == next(iter(starts))
-        people[str(id)] = track_scene(_options_of(options, scene, id, first), own, start, _kept(found[id]))
+        people[str(id)], found[id] = _track(_options_of(options, scene, id, first), own, start)
         outlines[id] = with_track(scene.people[id], _joints(scene, found[id]), np.asarray(scene.video.times))
     files = {}
     if options.overlay or options.report:
@@ -93,6 +94,20 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
     }
 
 
+def _track(options: ClipOptions, scene: Scene, start: Start) -> tuple[dict[str, Any], Estimates]:
+    """Track the person of a scene; return the figures and the estimates."""
+    found: Estimates = {}
+
+    def track(chosen: ClipOptions, scene: Scene) -> dict[str, Any]:
+        begin = start if chosen is options else _start(scene, scene.person, options.height)
+        if begin is None:
+            raise UserError(f"{options.video}: person {scene.person}: {_NO_WALK}")
+        found.clear()
+        return track_scene(chosen, scene, begin, _kept(found))
+
+    return track_all_motions(options, scene, track), found
+
+
 def numbered(path: str, id: int) -> str:
     """Add a person's number to a file name: track.csv becomes track-2.csv."""
     named = Path(path)
@@ -109,16 +124,24 @@ def _starts(options: ClipOptions, scene: Scene) -> tuple[dict[int, Start], dict[
         if len(starts) == options.people:
             break
         stature = options.height if id == scene.person else None
-        frames = scene.frames
-        found = start_in_keypoints(scene, id, frames.start, frames.stop, stature, best_second=True)
-        if found is None or not found.hypotheses[0].walks:
-            others[id] = _not_tracked(scene, id, "no second in which they walk in full view")
+        found = _start(scene, id, stature)
+        if found is None:
+            others[id] = _not_tracked(scene, id, _NO_WALK)
         else:
             del others[id]
-            starts[id] = replace(found, source="the joints detected in the images")
+            starts[id] = found
     if not starts:
         raise UserError(f"{options.video}: no one walks in full view for a second; check the camera")
     return starts, others
+
+
+def _start(scene: Scene, id: int, stature: float | None) -> Start | None:
+    """Find the first state of a person in the second that shows it best; None for one who never walks."""
+    frames = scene.frames
+    found = start_in_keypoints(scene, id, frames.start, frames.stop, stature, best_second=True)
+    if found is None or not found.hypotheses[0].walks:
+        return None
+    return replace(found, source="the joints detected in the images")
 
 
 def _not_tracked(scene: Scene, id: int, why: str) -> str:

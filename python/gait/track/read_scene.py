@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
-from gait.bindings.abi import Mode
 from gait.bindings.model import Model
 from gait.body.measured import model_of
 from gait.io.video import Video, background, reporting_damage
@@ -44,8 +43,7 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
     video = Video(options.video)
     frames = video.span(options.start or 0, options.stop)
     camera, poses = given_camera(options, video, frames)
-    name = options.model or ("paper" if options.mode == Mode.PAPER else "walk")
-    model = Model(name if options.body is None else model_of(options.body, name))
+    model = tracker_model(options)
     first = frames.start
     if starts and camera is not None and options.init != "auto":
         first = read_start(options, video, camera, poses, model).frame  # to fail early if it is invalid
@@ -100,6 +98,12 @@ def read_scene(options: ClipOptions, *, starts: bool = True) -> Scene:
             scene = replace(scene, person=who_starts(options, scene))
         require_feet(people[scene.person], video)
     return replace(scene, against_camera=_against_camera(options, scene)) if starts else scene
+
+
+def tracker_model(options: ClipOptions) -> Model:
+    """Load the model to track with, with the person's measurements if these are given."""
+    name = options.model_name
+    return Model(name if options.body is None else model_of(options.body, name))
 
 
 def _against_camera(options: ClipOptions, scene: Scene) -> str:

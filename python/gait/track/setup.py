@@ -26,6 +26,7 @@ _BESIDE = {"init": "init.json", "camera": "camera.json"}
 def setup(options: ClipOptions, scene: Scene, start: Start, used: bool) -> dict[str, str]:
     """Describe in words the inputs used, by name; `used`: whether the background was."""
     words = {
+        "model": options.model_name,
         "start": _start(options, start),
         "background": _background(options, scene, used),
         "camera": _camera(options, scene),
@@ -42,7 +43,6 @@ def settings(options: ClipOptions, scene: Scene, particles: int) -> dict[str, st
     return camera_facts(scene.camera) | {
         "picture": f"{scene.video.width} × {scene.video.height} px, {scene.video.fps:.4g} frames per second",
         "stature given": "not given" if options.height is None else f"{options.height:.2f} m",
-        "model": "the package's" if options.model is None else options.model,
         "body measured": "no" if options.body is None else options.body.source,
         "settings": "of the paper" if options.mode == Mode.PAPER else "default",
         "estimates": "each frame from the whole film (smoothed)"
