@@ -313,7 +313,7 @@ def astray(estimate):
             Script(estimate, ghosts[0], starts),
             Film(),
             people,
-            Plausibility(people, 1.75, 0.05, 0.0, FORWARDS),
+            Plausibility(people, 1.75, 0.05, 0.0, FORWARDS, [camera()]),
             find,
         )
         rows = list(follower.follow(Start(start, estimate.mean, estimate.sd), range(100)))
@@ -370,7 +370,7 @@ class Stops(Script):
 def test_a_stand_does_not_show_which_leg_is_the_right_one(estimate, frames, wanted):
     """A start without a phase is moved to where the person walks with status `tracking`, not to a stand."""
     people = PersonKeypoints(camera(), {1: {n: found() for n in range(100)}}, 1)
-    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS)
+    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS, [camera()])
     starts = []
     follower = Follower(
         Stops(estimate, -1, starts), Film(), people, plausible, lambda *_: None, one_pass=True
@@ -412,7 +412,7 @@ def of_sides(estimate):
         joints = (JOINTS[-1] - middle) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + middle
         keypoints = {n: found(joints=joints[order] if n in when else joints) for n in range(60)}
         people = PersonKeypoints(camera(), {1: keypoints}, 1)
-        plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS)
+        plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS, [camera()])
         rows = [(Frame(n, n / 30, FRAMES[0]), replace(estimate, joints=joints, frame=n)) for n in range(60)]
         return plausible, rows
 
@@ -554,7 +554,7 @@ def test_a_start_has_the_side_that_was_decided(estimate, phase, change, wanted):
         Walks(estimate, -1, starts),
         Film(),
         people,
-        Plausibility(people, 1.75, 0.05, 0.0, FORWARDS),
+        Plausibility(people, 1.75, 0.05, 0.0, FORWARDS, [camera()]),
         lambda *_: None,
     )
     rows = list(follower.follow(Start(0, mean, estimate.sd, hypotheses=(one,)), range(20)))
@@ -592,7 +592,7 @@ def test_the_side_of_a_walk_backwards_is_that_of_the_start(estimate):
     one = Hypothesis(mean, estimate.sd, 1.2, 0.1, 1.0, 1.0, False, True, np.eye(6))
     people = PersonKeypoints(camera(), {1: {n: found() for n in range(20)}}, 1)
     starts = []
-    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS | {"back": -1})
+    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS | {"back": -1}, [camera()])
     follower = Follower(Returns(estimate, -1, starts), Film(), people, plausible, lambda *_: None)
     list(follower.follow(Start(0, mean, estimate.sd, hypotheses=(one,)), range(20)))
     assert starts == [None, pytest.approx(0.12)]
@@ -603,7 +603,7 @@ def test_a_side_decided_after_a_stand_is_that_of_the_start(estimate):
     one = Hypothesis(mean, estimate.sd, 1.2, 0.1, 1.0, 1.0, False, True, np.eye(6))
     people = PersonKeypoints(camera(), {1: {n: found() for n in range(90)}}, 1)
     starts = []
-    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS)
+    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS, [camera()])
     follower = Follower(Pauses(estimate, -1, starts), Film(), people, plausible, lambda *_: None)
     list(follower.follow(Start(0, mean, estimate.sd, hypotheses=(one,)), range(90)))
     assert starts == [None, pytest.approx(0.12)]
@@ -620,10 +620,37 @@ def test_a_side_decided_after_a_stand_is_that_of_the_start(estimate):
     ],
 )
 def test_without_keypoints_a_walk_must_be_plausible(estimate, spike, grown, heading, motion_class, status):
-    plausible = Plausibility(PersonKeypoints(camera(), {}, -1), 1.75, 0.05, 0.0, FORWARDS | {"back": -1})
+    plausible = Plausibility(
+        PersonKeypoints(camera(), {}, -1), 1.75, 0.05, 0.0, FORWARDS | {"back": -1}, [camera()]
+    )
     for i in range(40):
         mean = replace(TRUE[-1], stature=1.75 + grown, heading=heading)
         mean.pelvis = np.array([1.2 * i / 30 + spike * (i > 20), 0.0, 0.95])
         walking = replace(estimate, mean=mean, speed=1.2, motion_class=motion_class)
         now = plausible.judged(Frame(i, i / 30, FRAMES[0]), walking)
     assert now.status == TrackStatus[status]
+
+
+@pytest.mark.parametrize(
+    "view, first, status",
+    [
+        (camera(), [], "TRACKING"),  # from the side
+        (camera((-6.0, 1.0, 1.4)), [], "AMBIGUOUS"),
+        (camera((-6.0, 1.0, 1.4)), ["walk"] * 10, "AMBIGUOUS"),
+        (camera((-6.0, 1.0, 1.4)), ["walk"] * 20, "TRACKING"),
+        (camera((-6.0, 1.0, 1.4)), ["stand"] * 20, "AMBIGUOUS"),
+    ],
+)
+def test_who_walks_backwards_before_the_camera_must_have_shown_the_direction(estimate, view, first, status):
+    """The person goes along x, facing the other way but for the first frames."""
+    directions = {"walk": 1, "back": -1, "stand": 0}
+    plausible = Plausibility(PersonKeypoints(view, {}, -1), 1.75, 0.05, 0.0, directions, [view])
+    place, found = 0.0, []
+    for i, motion_class in enumerate([*first, *["back"] * 40]):
+        speed = 0.0 if motion_class == "stand" else 1.2
+        place += (-speed if motion_class == "walk" else speed) / 30
+        mean = replace(TRUE[-1], heading=np.pi, pelvis=np.array([place, 0.0, 0.95]))
+        moving = replace(estimate, frame=i, mean=mean, speed=speed, motion_class=motion_class)
+        found.append((Frame(i, i / 30, FRAMES[0]), moving))
+    judged = [now.status for _, now in plausible.judged_later(found)]
+    assert set(judged[-30:]) == {TrackStatus[status]}

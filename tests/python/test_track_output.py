@@ -54,3 +54,7 @@ def test_half_a_second_of_another_motion_is_noticed(other, frames, noticed):
 @pytest.mark.parametrize("frames, noticed", [(20, False), (70, False), (90, True)])
 def test_a_person_who_is_hardly_ever_tracked_is_noticed(frames, noticed):
     assert results({"status": TrackStatus.AMBIGUOUS}, frames).walks() is not noticed
+
+
+def test_a_person_who_leaves_is_not_one_who_is_hardly_ever_tracked():
+    assert results({"status": TrackStatus.LOST}, 90).walks()

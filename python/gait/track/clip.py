@@ -162,7 +162,8 @@ def track_scene(
         further = [PersonKeypoints(one.camera, one.keypoints, one.person) for one in scene.further]
         keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person, scene.apart, further)
     model = scene.model
-    plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt, model.directions)
+    stature, cameras = _stature(options, scene, start), tracker.cameras
+    plausibility = Plausibility(keypoints, *stature, config.belt, model.directions, cameras)
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
     joints_found = keypoints if isinstance(keypoints, PersonKeypoints) else None

@@ -108,14 +108,14 @@ class Results:
         """Whether a model of walking follows what the person does.
 
         It does not if the person seems to stand, run or walk backwards for half a second, or if less than
-        half of the frames are `tracking`, unless there are too few to know.
+        half of the frames that are not lost are `tracking`, unless there are too few to know.
         """
         times, places = np.array(self.times), np.array([joints[0, :2] for joints in self.joints])
         lost = np.array([lost for _, lost, _ in self._frames])
         if len(times) < 2:
             return True
         tracking = self._statuses.count(TrackStatus.TRACKING)
-        if times[-1] - times[0] > _ENOUGH_S and tracking < _FOLLOWED * len(times):
+        if times[-1] - times[0] > _ENOUGH_S and tracking < _FOLLOWED * (~lost).sum():
             return False
         later = np.searchsorted(times, times + _WAY_S)
         whole, later = later < len(times), np.minimum(later, len(times) - 1)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
+from gait.camera.camera import Camera
 from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
@@ -37,6 +38,8 @@ class Plausibility:
         Share of each stride that a treadmill's belt moves the person back.
     directions : mapping of str to int
         `Model.directions`.
+    cameras : sequence of Camera
+        Of them only the first may move.
 
     Attributes
     ----------
@@ -50,11 +53,16 @@ class Plausibility:
         stature_sd: float,
         belt: float,
         directions: Mapping[str, int],
+        cameras: Sequence[Camera],
     ) -> None:
         self._keypoints = keypoints
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
         self.directions, self._travel = directions, 1.0 - belt
-        self._wrong_way = WrongWay(keypoints, directions)
+        self._cameras = cameras
+        self._wrong_way = self._new_wrong_way()
+
+    def _new_wrong_way(self) -> WrongWay:
+        return WrongWay(self._keypoints, self.directions, self._cameras)
 
     def restart(self) -> None:
         """Forget the last second, since the track starts again elsewhere."""
@@ -81,14 +89,14 @@ class Plausibility:
 
     def known_later(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
         """Yield judged estimates in order; those that led to the wrong way round become `ambiguous`."""
-        return known_later(found, WrongWay(self._keypoints, self.directions), 0.0)
+        return known_later(found, self._new_wrong_way(), 0.0)
 
     def judged_later(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
         """Judge the estimates of a smoothed track, in order, and those that led to the wrong way round.
 
         In such a track the second before anything indicates it is the wrong way round as well.
         """
-        return known_later(self._anew(found), WrongWay(self._keypoints, self.directions), _BEFORE_S)
+        return known_later(self._anew(found), self._new_wrong_way(), _BEFORE_S)
 
     def _anew(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
         """Judge the estimates of a track again."""

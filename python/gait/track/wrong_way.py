@@ -1,19 +1,24 @@
-"""Whether an estimate is the wrong way round: the person faces, or moves, against it.
+"""Whether an estimate is, or may be, the wrong way round: the person faces, or moves, against it.
 
 The last second of a track decides.  A detector confuses front and back in single frames, and the place of a
 person seen from the front is uncertain, so less evidence only indicates it.
+
+A person who walks backwards, seen from the front or from behind, looks like one who walks ahead of whom the
+detector confuses front and back, throughout.  Both are rare, so the estimate stays open until the track has
+shown that left and right are right: while the person walked ahead, or in a view from the side.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
+from gait.camera.camera import Camera
 from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
 from gait.track.person_shapes import PersonShapes
@@ -25,10 +30,13 @@ _AGAINST = 0.3  # metres in the last second by which the path leads against the 
 _SURELY = 3.0  # standard deviations of the place along the strides that it must be as well
 _INDICATES = 0.05  # metres of it that already indicate it
 _STRIDES = 0.2  # metres; shorter strides have no direction
+_ACROSS = 0.3  # least sine of the angle between heading and line of sight in a view from the side
+_SHOWN_S = 0.5  # for which the track must have shown which way the person faces
 _LONGEST_S = 2.0  # for which frames wait if anything indicates it
 _TURNED = "the detected joints show the person facing the other way"
 #: Reason of an estimate that is `ambiguous`, as that of people who walk backwards.
 AGAINST_STRIDES = "the path leads against the direction of the strides"
+_OPEN = "from the front or from behind, walking backwards looks like walking ahead"
 
 
 class WrongWay:
@@ -39,23 +47,31 @@ class WrongWay:
     keypoints : PersonKeypoints or PersonShapes
     directions : mapping of str to int
         `Model.directions`.
+    cameras : sequence of Camera
+        Of them only the first may move.
 
     Attributes
     ----------
     reason : str
-        Why the last estimate is the wrong way round; empty if it is not.
+        Why the last estimate is, or may be, the wrong way round; empty if it is not.
     indicated : bool
         Whether anything in the last second indicates it.
     """
 
-    def __init__(self, keypoints: PersonKeypoints | PersonShapes, directions: Mapping[str, int]) -> None:
-        self._keypoints, self._directions = keypoints, directions
+    def __init__(
+        self,
+        keypoints: PersonKeypoints | PersonShapes,
+        directions: Mapping[str, int],
+        cameras: Sequence[Camera],
+    ) -> None:
+        self._keypoints, self._directions, self._cameras = keypoints, directions, cameras
         self._second: deque[tuple[float, ...]] = deque()  # times, places, velocities, seconds turned
         self.restart()
 
     def restart(self) -> None:
         """Forget the last second, since the track starts again elsewhere."""
         self._second.clear()
+        self._shown = 0.0  # seconds in which the track showed which way the person faces
         self.reason, self.indicated = "", False
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
@@ -76,7 +92,26 @@ class WrongWay:
         else:
             least = max(_AGAINST * length, _SURELY * float(np.hypot(*(estimate.sd.pelvis[:2] * strides))))
             self.reason = AGAINST_STRIDES if length > _STRIDES and along < -least else ""
+        if not self.reason:
+            self._add_facing(frame, estimate, min(since, _FRAME_S))
         self.indicated = mirrored > 0.0 or along < -_INDICATES * length
+
+    def _add_facing(self, frame: Frame, estimate: Estimate, seconds: float) -> None:
+        """Add what an estimate that nothing contradicts shows of the direction in which the person faces."""
+        direction, across = self._directions[estimate.motion_class], self._across(frame, estimate)
+        if estimate.status == TrackStatus.TRACKING and (direction > 0 or across):
+            self._shown += seconds
+        if direction < 0 and not across and self._shown < _SHOWN_S:
+            self.reason = _OPEN
+
+    def _across(self, frame: Frame, estimate: Estimate) -> bool:
+        """Whether a camera sees the person from the side."""
+        heading = estimate.mean.heading
+        for camera in (frame.camera(self._cameras[0]), *self._cameras[1:]):
+            x, y = estimate.mean.pelvis[:2] - camera.centre[:2]
+            if abs(np.cos(heading) * y - np.sin(heading) * x) > _ACROSS * np.hypot(x, y):
+                return True
+        return False
 
     def path(self) -> tuple[np.ndarray, np.ndarray]:
         """Return how far the pelvis moved in the last second, and how far strides lead, (2,) metres."""
