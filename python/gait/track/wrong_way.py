@@ -3,8 +3,8 @@
 The last second of a track decides.  A detector confuses front and back in single frames, and the place of a
 person seen from the front is uncertain, so less evidence only indicates it.
 
-A person who walks backwards, seen from the front or from behind, looks like one who walks ahead of whom the
-detector confuses front and back, throughout.  Both are rare, so the estimate stays open until the track has
+Seen from the front or from behind, a person who walks backwards looks like one who walks ahead while the
+detector confuses front and back throughout.  Both are rare, so the estimate stays open until the track has
 shown that left and right are right: while the person walked ahead, or in a view from the side.
 """
 
@@ -93,10 +93,10 @@ class WrongWay:
             least = max(_AGAINST * length, _SURELY * float(np.hypot(*(estimate.sd.pelvis[:2] * strides))))
             self.reason = AGAINST_STRIDES if length > _STRIDES and along < -least else ""
         if not self.reason:
-            self._add_facing(frame, estimate, min(since, _FRAME_S))
+            self._add_front_back(frame, estimate, min(since, _FRAME_S))
         self.indicated = mirrored > 0.0 or along < -_INDICATES * length
 
-    def _add_facing(self, frame: Frame, estimate: Estimate, seconds: float) -> None:
+    def _add_front_back(self, frame: Frame, estimate: Estimate, seconds: float) -> None:
         """Add what an estimate that nothing contradicts shows of the direction in which the person faces."""
         direction, across = self._directions[estimate.motion_class], self._across(frame, estimate)
         if estimate.status == TrackStatus.TRACKING and (direction > 0 or across):
