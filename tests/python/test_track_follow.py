@@ -632,19 +632,23 @@ def test_without_keypoints_a_walk_must_be_plausible(estimate, spike, grown, head
 
 
 @pytest.mark.parametrize(
-    "view, first, status",
+    "view, first, expected, status",
     [
-        (camera(), [], "TRACKING"),  # from the side
-        (camera((-6.0, 1.0, 1.4)), [], "AMBIGUOUS"),
-        (camera((-6.0, 1.0, 1.4)), ["walk"] * 10, "AMBIGUOUS"),
-        (camera((-6.0, 1.0, 1.4)), ["walk"] * 20, "TRACKING"),
-        (camera((-6.0, 1.0, 1.4)), ["stand"] * 20, "AMBIGUOUS"),
+        (camera(), [], False, "TRACKING"),  # from the side
+        (camera((-6.0, 1.0, 1.4)), [], False, "AMBIGUOUS"),
+        (camera((-6.0, 1.0, 1.4)), [], True, "TRACKING"),
+        (camera((-6.0, 1.0, 1.4)), ["walk"] * 10, False, "AMBIGUOUS"),
+        (camera((-6.0, 1.0, 1.4)), ["walk"] * 20, False, "TRACKING"),
+        (camera((-6.0, 1.0, 1.4)), ["stand"] * 20, False, "AMBIGUOUS"),
     ],
 )
-def test_who_walks_backwards_before_the_camera_must_have_shown_the_direction(estimate, view, first, status):
+def test_who_walks_backwards_before_the_camera_must_have_shown_the_direction(
+    estimate, view, first, expected, status
+):
     """The person goes along x, facing the other way but for the first frames."""
     directions = {"walk": 1, "back": -1, "stand": 0}
-    plausible = Plausibility(PersonKeypoints(view, {}, -1), 1.75, 0.05, 0.0, directions, [view])
+    people = PersonKeypoints(view, {}, -1)
+    plausible = Plausibility(people, 1.75, 0.05, 0.0, directions, [view], backwards=expected)
     place, found = 0.0, []
     for i, motion_class in enumerate([*first, *["back"] * 40]):
         speed = 0.0 if motion_class == "stand" else 1.2

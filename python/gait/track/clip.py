@@ -96,7 +96,7 @@ def track_all_motions(
         note(f"{options.output}: {_NOT_WALKING}: track with -m {CLASSES}", options.quiet)
         return figures
     note(f"{options.output}: {_NOT_WALKING}: tracking again with -m {CLASSES}", options.quiet)
-    options = replace(options, model=CLASSES)
+    options = replace(options, model=CLASSES, model_chosen=True)
     try:
         return track(options, replace(scene, model=tracker_model(options)))
     except UserError as error:
@@ -162,8 +162,14 @@ def track_scene(
         further = [PersonKeypoints(one.camera, one.keypoints, one.person) for one in scene.further]
         keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person, scene.apart, further)
     model = scene.model
-    stature, cameras = _stature(options, scene, start), tracker.cameras
-    plausibility = Plausibility(keypoints, *stature, config.belt, model.directions, cameras)
+    plausibility = Plausibility(
+        keypoints,
+        *_stature(options, scene, start),
+        config.belt,
+        model.directions,
+        tracker.cameras,
+        backwards=not options.model_chosen,
+    )
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
     joints_found = keypoints if isinstance(keypoints, PersonKeypoints) else None

@@ -40,6 +40,8 @@ class Plausibility:
         `Model.directions`.
     cameras : sequence of Camera
         Of them only the first may move.
+    backwards : bool
+        Whether people who walk backwards are expected.
 
     Attributes
     ----------
@@ -54,15 +56,16 @@ class Plausibility:
         belt: float,
         directions: Mapping[str, int],
         cameras: Sequence[Camera],
+        backwards: bool = True,
     ) -> None:
         self._keypoints = keypoints
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
         self.directions, self._travel = directions, 1.0 - belt
-        self._cameras = cameras
+        self._cameras, self._backwards = cameras, backwards
         self._wrong_way = self._new_wrong_way()
 
     def _new_wrong_way(self) -> WrongWay:
-        return WrongWay(self._keypoints, self.directions, self._cameras)
+        return WrongWay(self._keypoints, self.directions, self._cameras, self._backwards)
 
     def restart(self) -> None:
         """Forget the last second, since the track starts again elsewhere."""

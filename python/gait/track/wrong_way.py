@@ -4,8 +4,9 @@ The last second of a track decides.  A detector confuses front and back in singl
 person seen from the front is uncertain, so less evidence only indicates it.
 
 Seen from the front or from behind, a person who walks backwards looks like one who walks ahead while the
-detector confuses front and back throughout.  Both are rare, so the estimate stays open until the track has
-shown that left and right are right: while the person walked ahead, or in a view from the side.
+detector confuses front and back throughout.  Both are rare, so unless people who walk backwards are expected
+the estimate stays open until the track has shown that left and right are right: while the person walked
+ahead, or in a view from the side.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ class WrongWay:
         `Model.directions`.
     cameras : sequence of Camera
         Of them only the first may move.
+    backwards : bool
+        Whether people who walk backwards are expected.
 
     Attributes
     ----------
@@ -63,8 +66,10 @@ class WrongWay:
         keypoints: PersonKeypoints | PersonShapes,
         directions: Mapping[str, int],
         cameras: Sequence[Camera],
+        backwards: bool,
     ) -> None:
         self._keypoints, self._directions, self._cameras = keypoints, directions, cameras
+        self._expected = backwards
         self._second: deque[tuple[float, ...]] = deque()  # times, places, velocities, seconds turned
         self.restart()
 
@@ -92,7 +97,7 @@ class WrongWay:
         else:
             least = max(_AGAINST * length, _SURELY * float(np.hypot(*(estimate.sd.pelvis[:2] * strides))))
             self.reason = AGAINST_STRIDES if length > _STRIDES and along < -least else ""
-        if not self.reason:
+        if not self.reason and not self._expected:
             self._add_front_back(frame, estimate, min(since, _FRAME_S))
         self.indicated = mirrored > 0.0 or along < -_INDICATES * length
 
