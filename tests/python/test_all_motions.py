@@ -31,9 +31,10 @@ class Stage:
     """What `track_all_motions` needs of a scene."""
 
     model: Model
+    people: dict[int, Any]
 
 
-def chosen(walks: dict[str, bool | None], **options: Any) -> list[str]:
+def chosen(walks: dict[str, bool | None], people: bool = True, **options: Any) -> list[str]:
     """Return the models that are tracked with, where `walks` states what each finds; None: no start."""
     tried = []
 
@@ -46,13 +47,15 @@ def chosen(walks: dict[str, bool | None], **options: Any) -> list[str]:
         return {"walks": found, "by": options.model_name}
 
     wanted = ClipOptions("walk.mp4", "camera.json", "track.csv", quiet=True, **options)
-    figures = track_all_motions(wanted, Stage(Model(wanted.model_name)), track)  # type: ignore[arg-type]
+    scene = Stage(Model(wanted.model_name), {1: None} if people else {})
+    figures = track_all_motions(wanted, scene, track)  # type: ignore[arg-type]
     return [*tried, figures["by"]]
 
 
-def test_only_without_a_model_another_one_is_tried():
+def test_only_without_a_model_and_with_keypoints_another_one_is_tried():
     assert chosen({"walk": True}) == ["walk", "walk"]
     assert chosen({"walk": False, "classes": False}) == ["walk", "classes", "classes"]
+    assert chosen({"walk": False}, people=False) == ["walk", "walk"]
     assert chosen({"walk": False}, model="walk") == ["walk", "walk"]
     assert chosen({"classes": False}, model="classes") == ["classes", "classes"]
     assert chosen({"paper": False}, mode=Mode.PAPER) == ["paper", "paper"]

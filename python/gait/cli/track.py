@@ -30,7 +30,8 @@ tallest or, without --camera, of the first in that order whose walk determines t
 
 Without -m the film is tracked with the model walk, which knows only walking.  If the person seems to stand,
 run or walk backwards for half a second, or less than half of the frames that are not lost are tracking (in 3
-s and more), it is tracked again with the model classes, which knows these motions too.
+s and more), it is tracked again with the model classes, which knows these motions too; but not without
+keypoints.
 
 --keypoints adds joints that a detector has found in the frames, in the formats that gait lift reads.  Joints
 that the model does not have are ignored; frames may be missing.

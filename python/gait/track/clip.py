@@ -87,12 +87,13 @@ def track_all_motions(
     """Track with the model of `options` or, without one, with the first that follows the person.
 
     The default model knows only walking.  If that does not follow what the person does, the scene is tracked
-    again with the model of motion classes, unless no start is found with it.
+    again with the model of motion classes, unless no start is found with it.  Without keypoints it is not, as
+    images alone may show a person who walks in place as one who stands.
     """
     figures = track(options, scene)
     if figures["walks"] or options.model_name != WALK:
         return figures
-    if options.model is not None:
+    if options.model is not None or not scene.people:
         note(f"{options.output}: {_NOT_WALKING}: track with -m {CLASSES}", options.quiet)
         return figures
     note(f"{options.output}: {_NOT_WALKING}: tracking again with -m {CLASSES}", options.quiet)
