@@ -104,7 +104,7 @@ all models were learnt from.  The start is the truth with noise and does not sta
 stand or walk backwards are tracked as walking for the first frames.  {ALONE}: the same model without its
 other classes.  {", ".join(USERS)}: as users track, with `gait track`, the camera, the
 detector and an automatic start, one seed: without -m, which tracks with walk and, if that does not follow
-the person, again with classes; with `-m classes`; and with --smooth too.  Errors are those of frames in
+the person, again with classes, as the row names; with `-m classes`; and with --smooth too.  Errors are those of frames in
 the track.
 
 - root: error with the hips aligned, median over frames, then over seeds; abs: error without alignment
@@ -241,6 +241,7 @@ class Followed:
     tracking: NDArray[np.bool_]  #: (n,) status
     motion_class: list[str]
     phase: NDArray[np.float64]  #: (n,) NaN where a track file has none
+    model: str = ""  #: that tracked, if none was given
 
 
 def _run(clip: Clip, source: str, seed: int) -> Run:
@@ -263,7 +264,7 @@ def _run(clip: Clip, source: str, seed: int) -> Run:
     judged = under & (classes != STANDING) & (reported != STANDING) & np.isfinite(followed.phase)
     return Run(
         clip.name,
-        Path(source).stem,
+        f"{source}: {followed.model}" if source in USERS and not USERS[source] else Path(source).stem,
         seed,
         1000 * float(np.median(root)),
         1000 * float(np.median(absolute)),
@@ -324,8 +325,9 @@ def _as_users(clip: Clip, source: str, seed: int) -> Followed:
     )
     track = read_estimates(out)
     under = np.array([status == "tracking" for status in track.status])
+    model = MODELS[bool(track.motion_class)]
     classes = list(track.motion_class) or [WALKING] * len(track.frame)
-    return Followed(track.frame, track.eval15(), track.eval15_sd(), under, classes, track.phase)
+    return Followed(track.frame, track.eval15(), track.eval15_sd(), under, classes, track.phase, model)
 
 
 def lifted(truth: Joints) -> NDArray[np.bool_]:

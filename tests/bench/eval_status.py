@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Status of the track of people who walk in unusual ways, with all defaults, as a newcomer runs it.
+"""Status of the track of people who walk in unusual ways, with one model and other options at their defaults.
 
     eval_status.py [--seeds 0,100] [--only NAME...] [--model classes] [--smooth] [--record]
 
-`gait track VIDEO --camera CAMERA -o OUT`, with the detector on, of clips that `gait simulate` makes and of
-the development clip of a person who comes towards a long lens.  Each preset is made with its own seed plus
+`gait track VIDEO --camera CAMERA -m MODEL -o OUT`, with the detector on, of clips that `gait simulate` makes
+and of the development clip of a person who comes towards a long lens.  Each preset is made with its own seed plus
 each of --seeds.  A model other than the default has a page of its own, and --smooth too.  Clips are kept in
 build/eval-status.
 """

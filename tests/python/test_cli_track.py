@@ -31,7 +31,7 @@ SUMMARY = [
     "ambiguous",
     "lost",
     "followed",
-    "walks",
+    "against_walk",
     "memory_bytes",
     "digest",
     "verdict",

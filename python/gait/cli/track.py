@@ -29,8 +29,8 @@ the command states when and where they are in view.  --height is the stature of 
 tallest or, without --camera, of the first in that order whose walk determines the camera.
 
 Without -m the film is tracked with the model walk, which knows only walking.  If the person seems to stand,
-run or walk backwards for half a second, or less than half of the frames that are not lost are tracking (in 3
-s and more), it is tracked again with the model classes, which knows these motions too; but not without
+run or walk backwards for half a second, is tracking in less than half of the frames (in 3 s and more), or is
+not found, it is tracked again with the model classes, which knows these motions too; but not without
 keypoints.
 
 --keypoints adds joints that a detector has found in the frames, in the formats that gait lift reads.  Joints
@@ -319,7 +319,7 @@ def _people(text: str) -> int:
 def _text_of_people(summary: dict[str, Any]) -> str:
     lines = []
     for number, one in summary["people"].items():
-        lines.append(f"person {number}: {one['verdict']}.")
+        lines.append(f"person {number}: {one['verdict']}; model {one['used']['model']}.")
         if one["warning"]:
             lines.append(f"warning: {one['warning']}")
         lines.append(f"  written: {', '.join(f'{what} {path}' for what, path in one['files'].items())}")

@@ -23,7 +23,7 @@ from gait.progress import note, progress, warning
 from gait.track.box_start import BoxStart
 from gait.track.clip_background import stays
 from gait.track.clip_keypoints import finds_shapes
-from gait.track.clip_output import write
+from gait.track.clip_output import HARDLY_TRACKED, Results, write
 from gait.track.first_state import first_state, start_in_keypoints
 from gait.track.follow import Follower
 from gait.track.further_cameras import require_cameras, with_further_cameras
@@ -45,17 +45,17 @@ __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
 #: Options of a pass that only estimates the body: what to track, and no outputs.
 _OF_A_PASS = (
     "model", "init", "background", "height", "further", "offsets", "mode", "particles", "seed", "threads",
-    "start", "stop", "detector",
+    "start", "stop", "detector", "model_chosen",
 )  # fmt: skip
 JointsOf = Callable[[ClipOptions, Scene], Moved]
-_NOT_WALKING = "the person seems not to walk ahead all the time"
+Track = Callable[[ClipOptions, Scene, int], dict[str, Any]]
 _HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init with --overlay"
 
 
 def track_clip(options: ClipOptions, joints_of: JointsOf | None = None) -> dict[str, Any]:
     """Track and write the files; return the figures of ``gait track --json``.
 
-    Unless a model is given, a person who does not only walk is tracked again with that of motion classes.
+    Without a model, a person who does not only walk is tracked as `track_all_motions` does.
     `joints_of` makes, from a scene with one camera, what moves the joints of the estimates; `own_body` of one
     film needs it.
 
@@ -71,38 +71,55 @@ def track_clip(options: ClipOptions, joints_of: JointsOf | None = None) -> dict[
     require_cameras(options)
     scene = with_further_cameras(options, read_scene(options))
 
-    def track(options: ClipOptions, scene: Scene) -> dict[str, Any]:
+    def track(options: ClipOptions, scene: Scene, least: int) -> dict[str, Any]:
         if options.own_body and scene.further:
             scene = _with_own_body(options, scene)
         start = first_state(options, scene)
         moved = None if joints_of is None else joints_of(options, scene)
-        return track_scene(options, scene, start, moved=moved)
+        return track_scene(options, scene, start, moved=moved, least=least)
 
     return track_all_motions(options, scene, track)
 
 
-def track_all_motions(
-    options: ClipOptions, scene: Scene, track: Callable[[ClipOptions, Scene], dict[str, Any]]
-) -> dict[str, Any]:
-    """Track with the model of `options` or, without one, with the first that follows the person.
+def track_all_motions(options: ClipOptions, scene: Scene, track: Track) -> dict[str, Any]:
+    """Track with the model of `options` or, without one, with that which follows the person.
 
     The default model knows only walking.  If that does not follow what the person does, the scene is tracked
-    again with the model of motion classes, unless no start is found with it.  Without keypoints it is not, as
+    again with the model of motion classes.  This one is kept unless no start is found with it, or it is
+    `tracking` in less frames although nothing but walking was seen.  Without keypoints it is not tried, as
     images alone may show a person who walks in place as one who stands.
+
+    `track` tracks with options and a scene, and raises UserError if it fails, or if less frames than its
+    third argument are `tracking`.
     """
-    figures = track(options, scene)
-    if figures["walks"] or options.model_name != WALK:
-        return figures
-    if options.model is not None or not scene.people:
-        note(f"{options.output}: {_NOT_WALKING}: track with -m {CLASSES}", options.quiet)
-        return figures
-    note(f"{options.output}: {_NOT_WALKING}: tracking again with -m {CLASSES}", options.quiet)
-    options = replace(options, model=CLASSES, model_chosen=True)
+    figures: dict[str, Any] = {}
     try:
-        return track(options, replace(scene, model=tracker_model(options)))
+        figures = track(options, scene, 0)
+        reason = figures["against_walk"]
     except UserError as error:
-        warning(f"{options.output}: tracked as walking only: {error}", options.quiet)
+        if not _open_model(options, scene):
+            raise
+        failed, reason = error, str(error)
+    if not reason or options.model_name != WALK:
         return figures
+    if not _open_model(options, scene):
+        note(f"{options.output}: {reason}; to follow other motions than walking: -m {CLASSES}", options.quiet)
+        return figures
+    note(f"{reason}; tracking again with the model {CLASSES}", options.quiet)
+    least = figures["tracking"] if reason == HARDLY_TRACKED else 0
+    chosen = replace(options, model=CLASSES, model_chosen=True)
+    try:
+        return track(chosen, replace(scene, model=tracker_model(chosen)), least)
+    except UserError as error:
+        if not figures:
+            raise failed from None
+        warning(f"{error}; the track with the model {WALK} is kept", options.quiet)
+        return figures
+
+
+def _open_model(options: ClipOptions, scene: Scene) -> bool:
+    """Whether another model is tried if the default one does not follow the person."""
+    return options.model is None and options.model_name == WALK and bool(scene.people)
 
 
 def _with_own_body(options: ClipOptions, scene: Scene) -> Scene:
@@ -132,8 +149,9 @@ def track_scene(
     start: Start,
     also: Sink | None = None,
     moved: Moved | None = None,
+    least: int = 0,
 ) -> dict[str, Any]:
-    """Track the person of a scene from a start.
+    """Track the person of a scene from a start; UserError if less than `least` frames are `tracking`.
 
     `also` receives the estimates, with the joints of the model's body; or `moved` moves these, by default to
     where several cameras measure them.
@@ -176,13 +194,10 @@ def track_scene(
     joints_found = keypoints if isinstance(keypoints, PersonKeypoints) else None
     if moved is None and scene.further and joints_found is not None:
         moved = MeasuredJoints(tracker.cameras, joints_found).moved
-    results = write(options, scene, tracker, found, plausibility, joints_found, also, moved)
+    results = write(options, scene, tracker, found, plausibility, joints_found, also, moved, least)
     report = RunReport(options, scene, used, tracker.config.particles)
-    for frame, x, y in results.starts[1:]:
-        warning(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
-    note("; ".join(results.coverage()), options.quiet)
-    if results.hardly_followed():
-        warning(f"{options.output}: {_HARDLY_FOLLOWED}")
+    if not (_open_model(options, scene) and results.against_walk()):
+        _note_coverage(options, results)
     if options.trc:
         times, joints = np.array(results.times), np.array(results.joints)
         write_trc(options.trc, scene.model.joint_names, times, joints, scene.video.fps)
@@ -193,6 +208,14 @@ def track_scene(
     began = {"offsets_s": list(scene.offsets)} if scene.further else {}
     counted = results.summary(options.threads, follower.step_seconds)
     return counted | camera | began | report.figures()
+
+
+def _note_coverage(options: ClipOptions, results: Results) -> None:
+    for frame, x, y in results.starts[1:]:
+        warning(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
+    note("; ".join(results.coverage()), options.quiet)
+    if results.hardly_followed():
+        warning(f"{options.output}: {_HARDLY_FOLLOWED}")
 
 
 def _stature(options: ClipOptions, scene: Scene, start: Start) -> tuple[float, float]:

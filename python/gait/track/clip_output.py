@@ -17,9 +17,11 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
 from gait.camera.camera import Camera, write_camera
 from gait.camera.path import CameraPose, write_path
+from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame
+from gait.motion.footfalls import Draws
 from gait.progress import durations, progress
 from gait.report.drawing import LEGEND_SECONDS, Overlay
 from gait.report.film import Films, PageFilm
@@ -33,8 +35,11 @@ from gait.track.standing import Estimated, Moved, Sink, Standing
 from gait.track.tracker import Tracker
 from gait.track.wrong_way import AGAINST_STRIDES
 
+#: What shows that a person does not only walk.
+_OTHER_MOTIONS = "the person seems to stand, run or walk backwards at times"
+HARDLY_TRACKED = "a model of walking follows the person in less than half of the frames"
 _HARDLY = 0.1  # share of the frames; a person followed in fewer was hardly followed
-_FOLLOWED = 0.5  # share of the frames; of a person who walks more are `tracking`
+_TRACKED = 0.5  # share of the frames; of a person who walks more are `tracking`
 _ENOUGH_S = 3.0  # seconds after which that holds; a track may need one to settle
 _RUNS = 2.2  # m/s; few people walk faster
 _WAY_S = 1.0  # seconds in which the way of a person shows that they run
@@ -54,6 +59,8 @@ class Results:
         Frame of each start of the tracker, and the person's position there, metres.
     film : PageFilm or None
         Film on the report's page.
+    draws : Draws or None
+        Motions drawn from a smoothed track.
     """
 
     def __init__(self, tracker: Tracker) -> None:
@@ -64,9 +71,10 @@ class Results:
         self.times: list[float] = []
         self.joints: list[np.ndarray[Any, Any]] = []
         self._frames: list[tuple[int, bool, bool]] = []  # number, whether lost, whether in the picture
-        self._not_walking: list[bool] = []  # whether the person stands, or moves against their strides
+        self._not_walking: list[bool] = []  # whether the person stands, or walks backwards
         self.starts: list[tuple[int, float, float]] = []
         self.film: PageFilm | None = None
+        self.draws: Draws | None = None
 
     def step(self, frame: Frame, estimate: Estimate) -> None:
         """Count a step of the tracker."""
@@ -82,8 +90,9 @@ class Results:
         self.joints.append(estimate.joints)
         shown = frame.camera(self._tracker.cameras[0]).shows(estimate.joints[:1])
         self._frames.append((frame.number, estimate.status == TrackStatus.LOST, shown))
+        ahead = self._tracker.model.directions[estimate.motion_class] > 0
         stands, backwards = np.isnan(estimate.mean.phase), estimate.reason == AGAINST_STRIDES
-        self._not_walking.append(bool(stands or backwards))
+        self._not_walking.append(bool(not ahead or stands or backwards))
 
     def coverage(self) -> list[str]:
         """Describe in which frames the person was followed, left the picture, or was lost."""
@@ -104,26 +113,28 @@ class Results:
         followed = sum(status in found for status in self._statuses)
         return self._statuses.count(TrackStatus.LOST) > count / 2 and followed < _HARDLY * count
 
-    def walks(self) -> bool:
-        """Whether a model of walking follows what the person does.
-
-        It does not if the person seems to stand, run or walk backwards for half a second, or if less than
-        half of the frames that are not lost are `tracking`, unless there are too few to know.
-        """
+    def against_walk(self) -> str:
+        """Why a model of walking does not follow what the person does, in words; empty if it does."""
         times, places = np.array(self.times), np.array([joints[0, :2] for joints in self.joints])
-        lost = np.array([lost for _, lost, _ in self._frames])
+        lost, shown = np.array([frame[1:] for frame in self._frames], bool).reshape(-1, 2).T
         if len(times) < 2:
-            return True
-        tracking = self._statuses.count(TrackStatus.TRACKING)
-        if times[-1] - times[0] > _ENOUGH_S and tracking < _FOLLOWED * (~lost).sum():
-            return False
+            return ""
         later = np.searchsorted(times, times + _WAY_S)
         whole, later = later < len(times), np.minimum(later, len(times) - 1)
         runs = np.linalg.norm(places[later] - places, axis=1) > _RUNS * (times[later] - times)
         losses = np.cumsum(lost)
         runs &= whole & (losses[later] == losses)  # where the person is found again, the place may jump
         other = (runs | np.array(self._not_walking)) & ~lost
-        return bool(other.sum() * np.median(np.diff(times)) < _OTHER_MOTION_S)
+        if other.sum() * np.median(np.diff(times)) >= _OTHER_MOTION_S:
+            return _OTHER_MOTIONS
+        if times[-1] - times[0] > _ENOUGH_S and self.tracking < _TRACKED * (shown | ~lost).sum():
+            return HARDLY_TRACKED
+        return ""
+
+    @property
+    def tracking(self) -> int:
+        """Number of frames that are `tracking`."""
+        return self._statuses.count(TrackStatus.TRACKING)
 
     def summary(self, threads: int, step_seconds: Sequence[float]) -> dict[str, Any]:
         """Return the figures of ``--json``; step_ms is only the time in gait_tracker_step."""
@@ -136,7 +147,7 @@ class Results:
             "wall_fps": self._count / self._wall,
             **{status.name.lower(): self._statuses.count(status) for status in TrackStatus},
             "followed": not self.hardly_followed(),
-            "walks": self.walks(),
+            "against_walk": self.against_walk(),
             "memory_bytes": tracker.memory_bytes,
             "digest": f"{tracker.digest():016x}",
         }
@@ -151,10 +162,12 @@ def write(
     keypoints: PersonKeypoints | None,
     also: Sink | None = None,
     moved: Moved | None = None,
+    least: int = 0,
 ) -> Results:
     """Write the estimates to all outputs, which appear together at the end.
 
-    Keypoints, if there are any, show in which frames the person takes no strides.  If `also` is given, it
+    With less than `least` frames that are `tracking` nothing is written, and UserError raised.  Keypoints,
+    if there are any, show in which frames the person takes no strides.  If `also` is given, it
     receives all estimates, with the joints of the model's body; otherwise `moved` may move these.
     """
     model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
@@ -179,7 +192,7 @@ def write(
         update = stack.enter_context(progress("tracking", len(span), options.quiet))
         estimates = _counted(found, results, update)
         if options.smooth:
-            estimates = _smoothed(options, scene, tracker, estimates, plausibility)
+            estimates = _smoothed(options, scene, tracker, estimates, plausibility, results)
         else:
             estimates = plausibility.known_later(estimates if films.wanted else _without_pictures(estimates))
         if keypoints is not None:
@@ -195,6 +208,11 @@ def write(
                 sink(frame, estimate)
         if not results.times:
             raise video.no_frame(span.start)
+        if results.tracking < least:
+            words = f"{results.tracking} frames are tracking, {least} without it"
+            raise UserError(f"{options.output}: with the model {options.model_name} {words}")
+        if options.draws and results.draws is not None:
+            results.draws.write(options.draws)
     results.film = films.page
     return results
 
@@ -294,19 +312,18 @@ def _smoothed(
     tracker: Tracker,
     found: Iterable[Estimated],
     plausibility: Plausibility,
+    results: Results,
 ) -> Iterator[Estimated]:
-    """Yield every frame with its smoothed estimate, and write the draws."""
+    """Yield every frame with its smoothed estimate, and add the draws to the results."""
     with Smoother(tracker) as smoother:
         for frame, estimate in found:
             smoother.add(frame, estimate)
         if not len(smoother):
             return
         with progress("smoothing", len(smoother), options.quiet) as update:
-            rows, draws = smoother.finish(update=update)
+            rows, results.draws = smoother.finish(update=update)
     frames: Iterable[Frame] = (frame for frame, _ in rows)
     if options.overlay or options.report:  # decode the pictures again
         frames = scene.video.frames(rows[0][0].number, rows[-1][0].number + 1)
     judged = plausibility.judged_later(rows)
     yield from ((frame, estimate) for frame, (_, estimate) in zip(frames, judged, strict=True))
-    if options.draws:  # last, so that they are never left beside an unfinished track
-        draws.write(options.draws)

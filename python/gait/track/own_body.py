@@ -83,7 +83,7 @@ def own_model(options: ClipOptions, scene: Scene, first: FirstPass) -> Model:
             f"{options.video}: --body auto: {len(first.estimates)} frames are tracked, {_LEAST} are needed; "
             "leave it out"
         )
-    sections = read_cyclic(options.model)
+    sections = read_cyclic(options.model_name)
     return Model(blob.encode(displaced(sections, _displacements(sections, scene, first))))
 
 

@@ -96,16 +96,18 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
 
 def _track(options: ClipOptions, scene: Scene, start: Start) -> tuple[dict[str, Any], Estimates]:
     """Track the person of a scene; return the figures and the estimates."""
-    found: Estimates = {}
+    tracks: list[Estimates] = []
 
-    def track(chosen: ClipOptions, scene: Scene) -> dict[str, Any]:
+    def track(chosen: ClipOptions, scene: Scene, least: int) -> dict[str, Any]:
         begin = start if chosen is options else _start(scene, scene.person, options.height)
         if begin is None:
             raise UserError(f"{options.video}: person {scene.person}: {_NO_WALK}")
-        found.clear()
-        return track_scene(chosen, scene, begin, _kept(found))
+        found: Estimates = {}
+        figures = track_scene(chosen, scene, begin, _kept(found), least=least)
+        tracks.append(found)
+        return figures
 
-    return track_all_motions(options, scene, track), found
+    return track_all_motions(options, scene, track), tracks[-1]
 
 
 def numbered(path: str, id: int) -> str:

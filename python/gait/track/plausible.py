@@ -62,10 +62,10 @@ class Plausibility:
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
         self.directions, self._travel = directions, 1.0 - belt
         self._cameras, self._backwards = cameras, backwards
-        self._wrong_way = self._new_wrong_way()
+        self._wrong_way = self._new_wrong_way(backwards=True)  # as expected: this must not undo a start
 
-    def _new_wrong_way(self) -> WrongWay:
-        return WrongWay(self._keypoints, self.directions, self._cameras, self._backwards)
+    def _new_wrong_way(self, backwards: bool) -> WrongWay:
+        return WrongWay(self._keypoints, self.directions, self._cameras, backwards)
 
     def restart(self) -> None:
         """Forget the last second, since the track starts again elsewhere."""
@@ -92,14 +92,14 @@ class Plausibility:
 
     def known_later(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
         """Yield judged estimates in order; those that led to the wrong way round become `ambiguous`."""
-        return known_later(found, self._new_wrong_way(), 0.0)
+        return known_later(found, self._new_wrong_way(self._backwards), 0.0)
 
     def judged_later(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
         """Judge the estimates of a smoothed track, in order, and those that led to the wrong way round.
 
         In such a track the second before anything indicates it is the wrong way round as well.
         """
-        return known_later(self._anew(found), self._new_wrong_way(), _BEFORE_S)
+        return known_later(self._anew(found), self._new_wrong_way(self._backwards), _BEFORE_S)
 
     def _anew(self, found: Iterable[tuple[Frame, Estimate]]) -> Iterator[tuple[Frame, Estimate]]:
         """Judge the estimates of a track again."""

@@ -57,7 +57,7 @@ class RunReport:
         from gait.report.run_page import Run, cycles_of, run_page  # Matplotlib is slow to import
 
         options, scene, track = self._options, self._scene, self._track
-        sections, found = read_cyclic(options.model), self._parameters
+        sections, found = read_cyclic(options.model_name), self._parameters
         run = Run(
             title=Path(options.video).name,
             track=track,
@@ -66,7 +66,7 @@ class RunReport:
             cycles=cycles_of(track, found, sections, self._draws),
             norms=[] if found is None else beside_norms(track, found, sections),
             without_norm="" if found is None else without_norm(found, sections),
-            model=options.model,
+            model=options.model_name,
             film=film,
             times=scene.video.times[film.frames.start : film.frames.stop],
             camera=scene.camera,

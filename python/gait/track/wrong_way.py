@@ -5,8 +5,8 @@ person seen from the front is uncertain, so less evidence only indicates it.
 
 Seen from the front or from behind, a person who walks backwards looks like one who walks ahead while the
 detector confuses front and back throughout.  Both are rare, so unless people who walk backwards are expected
-the estimate stays open until the track has shown that left and right are right: while the person walked
-ahead, or in a view from the side.
+the estimate may be the wrong way round until the track has shown that it is not: while the person walked ahead,
+or in a view from the side.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _LONGEST_S = 2.0  # for which frames wait if anything indicates it
 _TURNED = "the detected joints show the person facing the other way"
 #: Reason of an estimate that is `ambiguous`, as that of people who walk backwards.
 AGAINST_STRIDES = "the path leads against the direction of the strides"
-_OPEN = "from the front or from behind, walking backwards looks like walking ahead"
+_FRONT_OR_BACK = "from the front or from behind, walking backwards looks like walking ahead"
 
 
 class WrongWay:
@@ -107,7 +107,7 @@ class WrongWay:
         if estimate.status == TrackStatus.TRACKING and (direction > 0 or across):
             self._shown += seconds
         if direction < 0 and not across and self._shown < _SHOWN_S:
-            self.reason = _OPEN
+            self.reason = _FRONT_OR_BACK
 
     def _across(self, frame: Frame, estimate: Estimate) -> bool:
         """Whether a camera sees the person from the side."""
