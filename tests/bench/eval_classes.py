@@ -104,8 +104,8 @@ all models were learnt from.  The start is the truth with noise and does not sta
 stand or walk backwards are tracked as walking for the first frames.  {ALONE}: the same model without its
 other classes.  {", ".join(USERS)}: as users track, with `gait track`, the camera, the
 detector and an automatic start, one seed: without -m, which tracks with walk and, if that does not follow
-the person, again with classes, as the row names; with `-m classes`; and with --smooth too.  Errors are those of frames in
-the track.
+the person, again with classes, as the row names; with `-m classes`; and with --smooth too.  Errors are those
+of frames in the track.
 
 - root: error with the hips aligned, median over frames, then over seeds; abs: error without alignment
 - verdict, of the clips of `gait simulate`: reached, or what misses its target

@@ -4,9 +4,9 @@
     eval_status.py [--seeds 0,100] [--only NAME...] [--model classes] [--smooth] [--record]
 
 `gait track VIDEO --camera CAMERA -m MODEL -o OUT`, with the detector on, of clips that `gait simulate` makes
-and of the development clip of a person who comes towards a long lens.  Each preset is made with its own seed plus
-each of --seeds.  A model other than the default has a page of its own, and --smooth too.  Clips are kept in
-build/eval-status.
+and of the development clip of a person who comes towards a long lens.  Each preset is made with its own seed
+plus each of --seeds.  A model other than the default has a page of its own, and --smooth too.  Clips are kept
+in build/eval-status.
 """
 
 from __future__ import annotations

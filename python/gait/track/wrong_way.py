@@ -5,8 +5,8 @@ person seen from the front is uncertain, so less evidence only indicates it.
 
 Seen from the front or from behind, a person who walks backwards looks like one who walks ahead while the
 detector confuses front and back throughout.  Both are rare, so unless people who walk backwards are expected
-the estimate may be the wrong way round until the track has shown that it is not: while the person walked ahead,
-or in a view from the side.
+the estimate may be the wrong way round until the track has shown that it is not: while the person walked
+ahead, or in a view from the side.
 """
 
 from __future__ import annotations
