@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -14,13 +15,15 @@ import pytest
 
 from gait import Camera, Model, State
 from gait.bindings.abi import Mode
+from gait.bindings.model import CLASSES
 from gait.cli import main
 from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_track
+from gait.track import clip
 from gait.track.clip import track_all_motions
-from gait.track.clip_output import HARDLY_TRACKED
+from gait.track.clip_output import HARDLY_TRACKED, Check
 from gait.track.options import ClipOptions
 
 NOISE = 0.2  # pixels
@@ -42,15 +45,16 @@ def chosen(found: dict[str, Any], people: bool = True, quiet: bool = True, **opt
     """
     tried = []
 
-    def track(options: ClipOptions, scene: Any, least: int) -> dict[str, Any]:
+    def track(options: ClipOptions, scene: Any, check: Check) -> dict[str, Any]:
         tried.append(options.model_name)
         assert scene.model.classes == Model(options.model_name).classes
-        assert options.model_chosen == (len(tried) == 2)
+        assert bool(options.model_reason) == (options.model == CLASSES and len(tried) == 2)
         now = found[options.model_name]
-        if now is None or (isinstance(now, int) and now < least):
+        if now is None:
             raise UserError(f"walk.mp4: nothing with {options.model_name}")
         reason, tracking = (HARDLY_TRACKED, now) if isinstance(now, int) else (now, 50)
-        return {"against_walk": reason, "tracking": tracking, "by": options.model_name}
+        check(SimpleNamespace(against_walk=lambda: reason, tracking=tracking))  # type: ignore[arg-type]
+        return {"by": options.model_name}
 
     wanted = ClipOptions("walk.mp4", "camera.json", "track.csv", quiet=quiet, **options)
     scene = Stage(Model(wanted.model_name), {1: None} if people else {})
@@ -67,15 +71,17 @@ def test_only_without_a_model_and_with_keypoints_another_one_is_tried():
     assert chosen({"paper": "stands"}, mode=Mode.PAPER) == ["paper", "paper"]
 
 
-def test_the_track_that_follows_better_is_kept(capsys):
+def test_the_model_that_follows_the_person_more_is_kept(capsys):
     assert chosen({"walk": 10, "classes": 20}) == ["walk", "classes", "classes"]
-    assert chosen({"walk": 20, "classes": 10}, quiet=False) == ["walk", "classes", "walk"]
-    assert "nothing with classes; the track with the model walk is kept" in capsys.readouterr().err
     assert chosen({"walk": "stands", "classes": 10}) == ["walk", "classes", "classes"]
+    assert not capsys.readouterr().err
+    assert chosen({"walk": 20, "classes": 10}, quiet=False) == ["walk", "classes", "walk", "walk"]
+    words = "track.csv: with the model classes 10 frames are tracking, 20 without it; tracking with the model"
+    assert words in capsys.readouterr().err
 
 
 def test_a_person_without_a_start_is_searched_for_with_the_other_model():
-    assert chosen({"walk": "stands", "classes": None}) == ["walk", "classes", "walk"]
+    assert chosen({"walk": "stands", "classes": None}) == ["walk", "classes", "walk", "walk"]
     assert chosen({"walk": None, "classes": ""}) == ["walk", "classes", "classes"]
     with pytest.raises(UserError, match="nothing with walk"):
         chosen({"walk": None, "classes": None})
@@ -117,18 +123,38 @@ def stand(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(
-    "more, words, classes",
-    [
-        ([], "tracking again with the model classes", {"stand"}),
-        (["-m", "walk"], "to follow other motions than walking: -m classes", set()),
-    ],
-)
-def test_a_person_who_stands(stand, more, words, classes, capsys):
-    assert track(stand, "--init", str(stand / "init.json"), *more) == 0
+    "more, model, classes",
+    [([], "classes, as the person seems to stand, run or walk backwards at times", {"stand"}),
+     (["-m", "walk"], "walk", set())],
+)  # fmt: skip
+def test_a_person_who_stands(stand, more, model, classes, capsys):
+    assert track(stand, "--init", str(stand / "init.json"), "--json", *more) == 0
     out, err = capsys.readouterr()
-    assert words in err and f"model: {'classes' if classes else 'walk'}\n" in out
-    found = read_track(stand / "track.csv")
-    assert set(found.motion_class[-30:]) == classes
+    figures = json.loads(out)
+    assert figures["used"]["model"] == model
+    assert ("tracking again with the model classes" in err) == bool(classes)
+    assert any("to follow other motions than walking: -m classes" in one for one in figures["notes"]) == (
+        not classes
+    )
+    assert set(read_track(stand / "track.csv").motion_class[-30:]) == classes
+
+
+def test_an_interrupted_second_track_leaves_no_file(stand, tmp_path, monkeypatch):
+    """The first one is not written, since it is not kept."""
+    tried = []
+
+    def interrupted(options: ClipOptions) -> Model:
+        tried.append(options.model)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(clip, "tracker_model", interrupted)
+    files = [str(stand / name) for name in ("clip.mp4", "camera.json", "plate.png", "keypoints.csv")]
+    options = dict(zip(("video", "camera", "background", "keypoints"), files, strict=True))
+    with pytest.raises(KeyboardInterrupt):
+        clip.track_clip(
+            ClipOptions(**options, output=str(tmp_path / "o.csv"), init=str(stand / "init.json"), quiet=True)
+        )
+    assert tried == [CLASSES] and not list(tmp_path.iterdir())
 
 
 @pytest.fixture(scope="module")

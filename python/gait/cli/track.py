@@ -260,7 +260,7 @@ def run(args: argparse.Namespace) -> int:
     if args.report:
         import gait.report.run_page  # noqa: F401  so that a missing package is reported before long work
 
-    apart = ("model_chosen", "further", "own_body")
+    apart = ("model_reason", "further", "own_body")
     given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__ if name not in apart}
     given |= {
         "own_body": own_body,

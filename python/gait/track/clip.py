@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gait.bindings.abi import Term
+from gait.bindings.abi import Mode, Term
 from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start, set_height
@@ -23,7 +23,7 @@ from gait.progress import note, progress, warning
 from gait.track.box_start import BoxStart
 from gait.track.clip_background import stays
 from gait.track.clip_keypoints import finds_shapes
-from gait.track.clip_output import HARDLY_TRACKED, Results, write
+from gait.track.clip_output import HARDLY_TRACKED, Check, Results, accept, write
 from gait.track.first_state import first_state, start_in_keypoints
 from gait.track.follow import Follower
 from gait.track.further_cameras import require_cameras, with_further_cameras
@@ -45,10 +45,10 @@ __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
 #: Options of a pass that only estimates the body: what to track, and no outputs.
 _OF_A_PASS = (
     "model", "init", "background", "height", "further", "offsets", "mode", "particles", "seed", "threads",
-    "start", "stop", "detector", "model_chosen",
+    "start", "stop", "detector", "model_reason",
 )  # fmt: skip
 JointsOf = Callable[[ClipOptions, Scene], Moved]
-Track = Callable[[ClipOptions, Scene, int], dict[str, Any]]
+Track = Callable[[ClipOptions, Scene, Check], dict[str, Any]]
 _HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init with --overlay"
 
 
@@ -71,12 +71,12 @@ def track_clip(options: ClipOptions, joints_of: JointsOf | None = None) -> dict[
     require_cameras(options)
     scene = with_further_cameras(options, read_scene(options))
 
-    def track(options: ClipOptions, scene: Scene, least: int) -> dict[str, Any]:
+    def track(options: ClipOptions, scene: Scene, check: Check) -> dict[str, Any]:
         if options.own_body and scene.further:
             scene = _with_own_body(options, scene)
         start = first_state(options, scene)
         moved = None if joints_of is None else joints_of(options, scene)
-        return track_scene(options, scene, start, moved=moved, least=least)
+        return track_scene(options, scene, start, moved=moved, check=check)
 
     return track_all_motions(options, scene, track)
 
@@ -86,40 +86,50 @@ def track_all_motions(options: ClipOptions, scene: Scene, track: Track) -> dict[
 
     The default model knows only walking.  If that does not follow what the person does, the scene is tracked
     again with the model of motion classes.  This one is kept unless no start is found with it, or it is
-    `tracking` in less frames although nothing but walking was seen.  Without keypoints it is not tried, as
+    `tracking` in fewer frames although nothing but walking was seen.  Without keypoints it is not tried, as
     images alone may show a person who walks in place as one who stands.
 
-    `track` tracks with options and a scene, and raises UserError if it fails, or if less frames than its
-    third argument are `tracking`.
+    `track` tracks with options and a scene, and writes nothing if its third argument, called with the
+    results, raises UserError.
     """
-    figures: dict[str, Any] = {}
+    if options.model is not None or options.mode == Mode.PAPER or not scene.people:
+        return track(options, scene, accept)
+    failed: UserError | None = None
+    least = 0
     try:
-        figures = track(options, scene, 0)
-        reason = figures["against_walk"]
+        return track(options, scene, _require_walk)
+    except _NotOnlyWalkingError as error:
+        reason, least = str(error), error.least
     except UserError as error:
-        if not _open_model(options, scene):
-            raise
         failed, reason = error, str(error)
-    if not reason or options.model_name != WALK:
-        return figures
-    if not _open_model(options, scene):
-        note(f"{options.output}: {reason}; to follow other motions than walking: -m {CLASSES}", options.quiet)
-        return figures
     note(f"{reason}; tracking again with the model {CLASSES}", options.quiet)
-    least = figures["tracking"] if reason == HARDLY_TRACKED else 0
-    chosen = replace(options, model=CLASSES, model_chosen=True)
+    chosen = replace(options, model=CLASSES, model_reason=reason)
+
+    def require_more(results: Results) -> None:
+        if results.tracking < least:
+            words = f"{results.tracking} frames are tracking, {least} without it"
+            raise UserError(f"{options.output}: with the model {CLASSES} {words}")
+
     try:
-        return track(chosen, replace(scene, model=tracker_model(chosen)), least)
+        return track(chosen, replace(scene, model=tracker_model(chosen)), require_more)
     except UserError as error:
-        if not figures:
+        if failed is not None:
             raise failed from None
-        warning(f"{error}; the track with the model {WALK} is kept", options.quiet)
-        return figures
+        warning(f"{error}; tracking with the model {WALK} as before", options.quiet)
+        return track(options, scene, accept)
 
 
-def _open_model(options: ClipOptions, scene: Scene) -> bool:
-    """Whether another model is tried if the default one does not follow the person."""
-    return options.model is None and options.model_name == WALK and bool(scene.people)
+class _NotOnlyWalkingError(UserError):
+    """A model of walking does not follow the person; another one must be `tracking` in `least` frames."""
+
+    def __init__(self, reason: str, least: int) -> None:
+        super().__init__(reason)
+        self.least = least
+
+
+def _require_walk(results: Results) -> None:
+    if reason := results.against_walk():
+        raise _NotOnlyWalkingError(reason, results.tracking if reason == HARDLY_TRACKED else 0)
 
 
 def _with_own_body(options: ClipOptions, scene: Scene) -> Scene:
@@ -149,9 +159,9 @@ def track_scene(
     start: Start,
     also: Sink | None = None,
     moved: Moved | None = None,
-    least: int = 0,
+    check: Check = accept,
 ) -> dict[str, Any]:
-    """Track the person of a scene from a start; UserError if less than `least` frames are `tracking`.
+    """Track the person of a scene from a start; write nothing if `check`, called with the results, raises.
 
     `also` receives the estimates, with the joints of the model's body; or `moved` moves these, by default to
     where several cameras measure them.
@@ -187,17 +197,20 @@ def track_scene(
         config.belt,
         model.directions,
         tracker.cameras,
-        backwards=not options.model_chosen,
+        backwards=not options.model_reason,
     )
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
     joints_found = keypoints if isinstance(keypoints, PersonKeypoints) else None
     if moved is None and scene.further and joints_found is not None:
         moved = MeasuredJoints(tracker.cameras, joints_found).moved
-    results = write(options, scene, tracker, found, plausibility, joints_found, also, moved, least)
-    report = RunReport(options, scene, used, tracker.config.particles)
-    if not (_open_model(options, scene) and results.against_walk()):
-        _note_coverage(options, results)
+    results = write(options, scene, tracker, found, plausibility, joints_found, also, moved, check)
+    report = RunReport(options, scene, used, tracker.config.particles, _advice(options, scene, results))
+    for frame, x, y in results.starts[1:]:
+        warning(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
+    note("; ".join(results.coverage()), options.quiet)
+    if results.hardly_followed():
+        warning(f"{options.output}: {_HARDLY_FOLLOWED}")
     if options.trc:
         times, joints = np.array(results.times), np.array(results.joints)
         write_trc(options.trc, scene.model.joint_names, times, joints, scene.video.fps)
@@ -210,12 +223,12 @@ def track_scene(
     return counted | camera | began | report.figures()
 
 
-def _note_coverage(options: ClipOptions, results: Results) -> None:
-    for frame, x, y in results.starts[1:]:
-        warning(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
-    note("; ".join(results.coverage()), options.quiet)
-    if results.hardly_followed():
-        warning(f"{options.output}: {_HARDLY_FOLLOWED}")
+def _advice(options: ClipOptions, scene: Scene, results: Results) -> list[str]:
+    """Suggest the other model if that of walking was given, or none could be tried, and does not suffice."""
+    reason = results.against_walk()
+    if not reason or options.model_name != WALK or (options.model is None and scene.people):
+        return []
+    return [f"{reason}; to follow other motions than walking: -m {CLASSES}"]
 
 
 def _stature(options: ClipOptions, scene: Scene, start: Start) -> tuple[float, float]:

@@ -17,7 +17,6 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
 from gait.camera.camera import Camera, write_camera
 from gait.camera.path import CameraPose, write_path
-from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame
@@ -109,9 +108,8 @@ class Results:
 
     def hardly_followed(self) -> bool:
         """Whether the person was lost most of the time and hardly ever followed."""
-        count, found = len(self._statuses), (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
-        followed = sum(status in found for status in self._statuses)
-        return self._statuses.count(TrackStatus.LOST) > count / 2 and followed < _HARDLY * count
+        count = len(self._statuses)
+        return self._statuses.count(TrackStatus.LOST) > count / 2 and self._followed < _HARDLY * count
 
     def against_walk(self) -> str:
         """Why a model of walking does not follow what the person does, in words; empty if it does."""
@@ -127,9 +125,16 @@ class Results:
         other = (runs | np.array(self._not_walking)) & ~lost
         if other.sum() * np.median(np.diff(times)) >= _OTHER_MOTION_S:
             return _OTHER_MOTIONS
+        if not self._followed:
+            return HARDLY_TRACKED
         if times[-1] - times[0] > _ENOUGH_S and self.tracking < _TRACKED * (shown | ~lost).sum():
             return HARDLY_TRACKED
         return ""
+
+    @property
+    def _followed(self) -> int:
+        """Number of frames that are `tracking` or `ambiguous`."""
+        return self.tracking + self._statuses.count(TrackStatus.AMBIGUOUS)
 
     @property
     def tracking(self) -> int:
@@ -153,6 +158,13 @@ class Results:
         }
 
 
+Check = Callable[[Results], None]
+
+
+def accept(results: Results) -> None:
+    """Accept any results."""
+
+
 def write(
     options: ClipOptions,
     scene: Scene,
@@ -162,12 +174,11 @@ def write(
     keypoints: PersonKeypoints | None,
     also: Sink | None = None,
     moved: Moved | None = None,
-    least: int = 0,
+    check: Check = accept,
 ) -> Results:
-    """Write the estimates to all outputs, which appear together at the end.
+    """Write the estimates to all outputs, which appear together at the end unless `check` raises.
 
-    With less than `least` frames that are `tracking` nothing is written, and UserError raised.  Keypoints,
-    if there are any, show in which frames the person takes no strides.  If `also` is given, it
+    Keypoints, if there are any, show in which frames the person takes no strides.  If `also` is given, it
     receives all estimates, with the joints of the model's body; otherwise `moved` may move these.
     """
     model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
@@ -208,9 +219,7 @@ def write(
                 sink(frame, estimate)
         if not results.times:
             raise video.no_frame(span.start)
-        if results.tracking < least:
-            words = f"{results.tracking} frames are tracking, {least} without it"
-            raise UserError(f"{options.output}: with the model {options.model_name} {words}")
+        check(results)
         if options.draws and results.draws is not None:
             results.draws.write(options.draws)
     results.film = films.page

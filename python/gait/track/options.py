@@ -42,8 +42,8 @@ class ClipOptions:
     model : str, optional
         By default the package's: in paper mode ``paper``, otherwise ``walk``, or ``classes`` if that does not
         follow the person.
-    model_chosen : bool
-        Whether `model` was chosen because the default one did not follow the person.
+    model_reason : str
+        Why `model` was chosen instead of the default one; empty if it was not.
     init, background : str
         A file, ``auto``, or for the background ``none``.
     height : float, optional
@@ -83,7 +83,7 @@ class ClipOptions:
     camera: str | None
     output: str
     model: str | None = None
-    model_chosen: bool = False
+    model_reason: str = ""
     init: str = "auto"
     background: str = "auto"
     height: float | None = None

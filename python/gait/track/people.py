@@ -7,7 +7,7 @@ others' keypoints are left out, that the silhouette is not compared where others
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start
+from gait.bindings.model import Model
 from gait.detect.people import by_size
 from gait.errors import UserError
 from gait.io.files import replacing
@@ -30,6 +31,7 @@ from gait.report.film import Films, PageFilm
 from gait.report.people_page import Person, people_page
 from gait.track.clip import track_all_motions, track_scene
 from gait.track.clip_background import require_scene
+from gait.track.clip_output import Check
 from gait.track.first_state import start_in_keypoints
 from gait.track.options import ClipOptions
 from gait.track.other_people import Outline, with_track
@@ -65,15 +67,17 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
     found: dict[int, Estimates] = {}
     outlines = dict(scene.people)
     people: dict[str, Any] = {}
+    models: dict[int, Model] = {}
     for id, start in starts.items():
         note(f"person {id}", options.quiet)
         own = _scene_of(scene, id, list(starts), outlines)
         first = id == next(iter(starts))
-        people[str(id)], found[id] = _track(_options_of(options, scene, id, first), own, start)
+        options_of = _options_of(options, scene, id, first)
+        people[str(id)], found[id], models[id] = _track(options_of, own, start)
         outlines[id] = with_track(scene.people[id], _joints(scene, found[id]), np.asarray(scene.video.times))
     files = {}
     if options.overlay or options.report:
-        film = _draw(options, scene, found)
+        film = _draw(options, scene, found, models)
     if options.overlay:
         files["overlay"] = options.overlay
     if options.report:
@@ -94,20 +98,23 @@ def track_people(options: ClipOptions) -> dict[str, Any]:
     }
 
 
-def _track(options: ClipOptions, scene: Scene, start: Start) -> tuple[dict[str, Any], Estimates]:
-    """Track the person of a scene; return the figures and the estimates."""
-    tracks: list[Estimates] = []
+def _track(options: ClipOptions, scene: Scene, start: Start) -> tuple[dict[str, Any], Estimates, Model]:
+    """Track the person of a scene; return the figures, the estimates, and the model that tracked."""
+    kept: tuple[Estimates, Model] | None = None
 
-    def track(chosen: ClipOptions, scene: Scene, least: int) -> dict[str, Any]:
+    def track(chosen: ClipOptions, scene: Scene, check: Check) -> dict[str, Any]:
+        nonlocal kept
         begin = start if chosen is options else _start(scene, scene.person, options.height)
         if begin is None:
             raise UserError(f"{options.video}: person {scene.person}: {_NO_WALK}")
         found: Estimates = {}
-        figures = track_scene(chosen, scene, begin, _kept(found), least=least)
-        tracks.append(found)
+        figures = track_scene(chosen, scene, begin, _kept(found), check=check)
+        kept = found, scene.model
         return figures
 
-    return track_all_motions(options, scene, track), tracks[-1]
+    figures = track_all_motions(options, scene, track)
+    assert kept is not None
+    return figures, *kept
 
 
 def numbered(path: str, id: int) -> str:
@@ -218,21 +225,28 @@ def _colours(found: dict[int, Estimates]) -> dict[int, tuple[int, int, int]]:
     return {id: PERSON_COLOURS[k % len(PERSON_COLOURS)] for k, id in enumerate(sorted(found))}
 
 
-def _draw(options: ClipOptions, scene: Scene, found: dict[int, Estimates]) -> PageFilm | None:
+def _draw(
+    options: ClipOptions, scene: Scene, found: dict[int, Estimates], models: Mapping[int, Model]
+) -> PageFilm | None:
     """Write the film with everyone, each in their own colour and with their number above the head.
 
     Returns the film for the page, if one is to be written.
     """
     colours = {str(id): colour for id, colour in _colours(found).items()}
-    still = Overlay(scene.model, scene.camera)
+    still = {model: Overlay(model, scene.camera) for model in models.values()}
     size = (scene.camera.width, scene.camera.height)
     with (
         Films(options.overlay, options.report, scene.frames, size, scene.video.fps) as films,
         progress("drawing", len(scene.frames), options.quiet) as update,
     ):
         for frame in scene.video.frames(scene.frames.start, scene.frames.stop):
-            overlay = still if frame.pose is None else Overlay(scene.model, frame.camera(scene.camera))
-            now = {str(id): one[frame.number] for id, one in sorted(found.items()) if frame.number in one}
-            films.write(overlay.draw_people(frame.image, now, colours), frame.number)
+            picture = frame.image
+            for model, overlay in still.items():
+                if frame.pose is not None:
+                    overlay = Overlay(model, frame.camera(scene.camera))
+                ids = [id for id, one in sorted(found.items()) if models[id] is model and frame.number in one]
+                now = {str(id): found[id][frame.number] for id in ids}
+                picture = overlay.draw_people(picture, now, colours)
+            films.write(picture, frame.number)
             update(frame.number - scene.frames.start + 1)
     return films.page

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +28,20 @@ class RunReport:
     used : mapping of str to str
         Which start, background, camera and joints were used, in words.
     particles : int
+    notes : sequence of str
+        Remarks about the track.
     """
 
-    def __init__(self, options: ClipOptions, scene: Scene, used: Mapping[str, str], particles: int) -> None:
+    def __init__(
+        self,
+        options: ClipOptions,
+        scene: Scene,
+        used: Mapping[str, str],
+        particles: int,
+        notes: Sequence[str] = (),
+    ) -> None:
         self._options, self._scene, self._used, self._particles = options, scene, dict(used), particles
+        self._of_track = notes
         self._track = read_track(options.output)
         self._draws = Draws.read(options.draws, self._track) if options.draws else None
         self._parameters = measured(self._track, self._draws)
@@ -50,7 +60,7 @@ class RunReport:
 
     def _notes(self) -> list[str]:
         broken = self._scene.video.broken
-        return [*([broken] if broken else []), *beside(self._options)]
+        return [*([broken] if broken else []), *beside(self._options), *self._of_track]
 
     def write(self, path: str, film: PageFilm) -> None:
         """Write the page."""

@@ -26,7 +26,7 @@ _BESIDE = {"init": "init.json", "camera": "camera.json"}
 def setup(options: ClipOptions, scene: Scene, start: Start, used: bool) -> dict[str, str]:
     """Describe in words the inputs used, by name; `used`: whether the background was."""
     words = {
-        "model": options.model_name,
+        "model": options.model_name + (options.model_reason and f", as {options.model_reason}"),
         "start": _start(options, start),
         "background": _background(options, scene, used),
         "camera": _camera(options, scene),
