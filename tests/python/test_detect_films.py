@@ -147,13 +147,18 @@ def commands(folder, name):
 
 
 COMMANDS = ["detect", "camera", "lift", "track"]
-FEET = "the person's feet are not in view; film the whole person, feet included"
+FEET = "the person's feet are not in view for 0.3 s; film the whole person, feet included, for at least a se"
 
 
 @pytest.mark.parametrize("command", COMMANDS[1:])
 def test_feet_that_are_never_in_view_are_named(command, walk, tmp_path, capsys):
     film(tmp_path / "film.mp4", [picture[:330] for picture in walk[1]])
     assert FEET in refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")[command])
+
+
+def test_a_film_of_a_few_frames_is_too_short(walk, tmp_path, capsys):
+    film(tmp_path / "film.mp4", walk[1][:5])
+    assert FEET in refused(capsys, tmp_path, *commands(tmp_path, "film.mp4")["track"])
 
 
 @pytest.mark.parametrize("command", COMMANDS[1:])

@@ -654,7 +654,8 @@ def require_feet(keypoints: Keypoints, video: Video) -> None:
     inside = ((ankles >= 0) & (ankles <= np.array(video.size) - 1)).all(axis=(1, 2))
     if inside.sum() < _LEAST_FEET * video.fps:
         raise UserError(
-            f"{video.path}: the person's feet are not in view; film the whole person, feet included"
+            f"{video.path}: the person's feet are not in view for {_LEAST_FEET} s; film the whole person, "
+            "feet included, for at least a second"
         )
 
 
