@@ -658,3 +658,20 @@ def test_who_walks_backwards_before_the_camera_must_have_shown_the_direction(
         found.append((Frame(i, i / 30, FRAMES[0]), moving))
     judged = [now.status for _, now in plausible.judged_later(found)]
     assert set(judged[-30:]) == {TrackStatus[status]}
+
+
+@pytest.mark.parametrize(
+    "speed, off, status",
+    [(1.2, 0.07, "TRACKING"), (0.0, 0.03, "TRACKING"), (0.0, 0.07, "AMBIGUOUS")],
+)
+def test_the_legs_of_a_person_who_stands_must_be_where_they_stand(estimate, speed, off, status):
+    """The detector shows one leg elsewhere, by a share of the person's height."""
+    standing = replace(estimate, speed=speed)
+    names = tuple(estimate.joint_names)
+    uv = camera().project(estimate.joints)
+    height = np.ptp(uv[:, 1])
+    uv[[names.index("r_knee"), names.index("r_ankle")], 0] += off * height
+    keypoints = FrameKeypoints(names, uv, np.ones(len(names)))
+    people = PersonKeypoints(camera(), {1: {0: keypoints}}, 1)
+    plausible = Plausibility(people, 1.75, 0.05, 0.0, FORWARDS, [camera()])
+    assert plausible.judged(Frame(0, 0.0, FRAMES[0]), standing).status == TrackStatus[status]

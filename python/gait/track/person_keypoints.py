@@ -23,7 +23,8 @@ from gait.io.video import Frame
 _GATE = 0.25  # person's heights; keypoints with a larger median distance are not the person's
 _SUPPORTING_DISTANCE = 0.15  # person's heights; up to this distance they support the estimate
 _AGREE = 0.08  # person's heights; mean distance up to which knees and ankles agree with the estimate
-_LEG_JOINTS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
+_STANDS = 0.05  # the same for each leg of a person who stands; of one who steps a leg is further away
+_LEGS = ("l_knee", "l_ankle"), ("r_knee", "r_ankle")
 _TRUNK_PAIRS = (("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"))
 _APART = 3.0  # sds of their distance by which left and right are apart in a view that shows the direction
 
@@ -127,8 +128,14 @@ class PersonKeypoints:
         # the tracker judges left and right; a detector confuses them in single frames
         names = tuple(keypoints.names)
         swapped = replace(keypoints, names=tuple(names[k] for k in other_sides(names)))
-        legs = [self._distances(frame, estimate, one, _LEG_JOINTS) for one in (keypoints, swapped)]
-        return not len(legs[0]) or bool(min(distances.mean() for distances in legs) < _AGREE)
+        legs, most = (_LEGS, _STANDS) if not estimate.takes_strides else ((_LEGS[0] + _LEGS[1],), _AGREE)
+        return any(
+            all(
+                not len(apart) or apart.mean() < most
+                for apart in (self._distances(frame, estimate, one, leg) for leg in legs)
+            )
+            for one in (keypoints, swapped)
+        )
 
     def faces(self, frame: Frame, estimate: Estimate) -> bool | None:
         """Whether the trunk in the keypoints faces as the estimate does; None if the view does not show it.
