@@ -13,15 +13,17 @@ import drawn_person
 import numpy as np
 import pytest
 
-from gait import Camera, Model, State
-from gait.bindings.abi import Mode
+from gait import Camera, Model, State, TrackStatus, Video
+from gait.bindings.abi import Flag, Mode
+from gait.bindings.estimate import Estimate
 from gait.bindings.model import CLASSES
 from gait.cli import main
 from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_track
-from gait.track import clip
+from gait.io.video import Frame
+from gait.track import clip, people
 from gait.track.clip import track_all_motions
 from gait.track.clip_output import HARDLY_TRACKED, Check
 from gait.track.options import ClipOptions
@@ -179,3 +181,29 @@ def test_who_walks_backwards_before_the_camera_is_only_sure_if_that_is_expected(
     found = read_track(retreat / "track.csv")
     assert set(found.motion_class[-60:]) == {"backwards"}
     assert least <= np.mean([status == "tracking" for status in found.status]) <= most
+
+
+def test_each_person_is_drawn_with_the_model_that_tracked_them(tmp_path):
+    """A person who stands beside one who walks: the model of walking has no such class."""
+    view, walk, classes = drawn_person.camera(), Model("walk"), Model("classes")
+    pictures = [Frame(0, 0.0, drawn_person.wall())]
+    film = SimpleNamespace(fps=drawn_person.FPS, frames=lambda start, stop: iter(pictures[start:stop]))
+    scene = SimpleNamespace(camera=view, frames=range(1), video=film)
+    found, models = {}, {1: walk, 2: classes}
+    for id, model in models.items():
+        state = State(stature=1.75, phase=0.3, stride_hz=0.9, motion_class=len(model.classes) - 1)
+        state.coef = np.zeros(model.info.components)
+        state.pelvis[:] = id - 1.5, 0.0, model.pelvis_height(state)
+        joints = model.pose(state)[0]
+        found[id] = {
+            0: Estimate(
+                0, 0, TrackStatus.TRACKING, Flag(0), 0.0, 1.0, 1.0, 1.0, 1.0, state, state, state,
+                joints, np.full_like(joints, 0.01), np.zeros(0), model.joint_names,
+            )
+        }  # fmt: skip
+    options = ClipOptions("v.mp4", "c.json", "o.csv", overlay=str(tmp_path / "o.mp4"), quiet=True)
+    people._draw(options, scene, found, models)  # type: ignore[arg-type]
+    drawn = next(Video(tmp_path / "o.mp4").frames()).image.astype(int)
+    changed = np.abs(drawn - pictures[0].image).max(axis=2) > 60
+    left, right = changed[:, :160].mean(), changed[:, 160:].mean()
+    assert min(left, right) > 0.01
