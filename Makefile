@@ -107,7 +107,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lock lib tools test test-all built check unit python-test demo model paper bench bench-board bench-instructions bench-peers size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check lowest \
+.PHONY: help setup lock lib tools test test-all built check unit python-test demo model paper bench bench-board bench-instructions bench-peers size bench-lift detector-profile eval eval-body eval-camera eval-cameras eval-classes eval-gait eval-moving eval-real eval-learn eval-lift eval-paper eval-people eval-studio soak kills mutants asan sanitizers tsan coverage unit-threads fuzz fuzz-run fuzz-long fuzz-targets golden-check lowest \
         docs screenshots sbom lint format wheel sdist wheel-check reproducible install install-daemon uninstall clean
 
 help: ## list the targets
@@ -486,7 +486,7 @@ bench-lift: $(B)/bench/lift | $(READY) ## time lifting a frame, a segment, by in
 bench-peers: setup lib ## the tracker beside BlazePose, MediaPipe and PARSEC's bodytrack (ARGS='--mediapipe PYTHON'; --record) *
 	@$(PY) tests/bench/peers.py $(ARGS)
 
-eval: setup lib ## errors on the clips, compared with their targets *
+eval: setup lib ## errors on the clips, compared with their targets (gait parameters: eval-gait) *
 	@$(PY) tests/bench/eval.py $(ARGS)
 
 # Other packages to compare with, in an environment of their own; without a network they are left out.
@@ -525,6 +525,9 @@ detector-profile: setup lib ## learn the differences between the detector's join
 
 mutants: setup ## change each equation of both papers once: a test of its meaning must fail
 	@$(PY) tests/bench/mutants.py $(ARGS)
+
+eval-classes: setup lib ## people who stop, stand, turn, run or walk backwards: tests/bench/results/eval_classes.md *
+	@$(PY) tests/bench/eval_classes.py $(ARGS)
 
 eval-gait: setup lib ## gait analysis: footfalls, parameters, angles, their intervals: eval_gait.md *
 	@$(PY) tests/bench/eval_gait.py $(ARGS)

@@ -1,7 +1,6 @@
 """Classes of motion: people who stop, stand, turn, walk backwards or run, tracked with and without classes.
 
-    make built && .venv/bin/python tests/bench/eval_classes.py [--seeds 3] [--record]
-    .venv/bin/python tests/bench/eval_classes.py --only stopping backwards
+    make eval-classes, or eval_classes.py [--seeds 3] [--only stopping backwards] [--record]
 
 The clips are presets of `gait simulate`, with further seeds of the person; the slow walks and runs of
 `eval_simulated`; and the development clips.  The models are those of the package: walk; classes, which walks,
@@ -157,8 +156,8 @@ class Run:
     foot: float | None  #: m/s, median, of the ankle of a foot that stands; None: the person does not move
 
 
-def main() -> None:
-    """Make the clips that are missing, track and print."""
+def main() -> int:
+    """Make the clips that are missing, track and print; exit code 1 if a clip misses a target."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -180,6 +179,7 @@ def main() -> None:
         notes.append(_outdoor(args.seeds))
     note = "\n\n".join([_READING, *notes])
     table.publish("eval_classes", TITLE, COLUMNS, rows, note, record=args.record)
+    return int(any(str(row[COLUMNS.index("verdict")]).startswith("missed") for row in rows))
 
 
 def _clips(only: list[str] | None) -> list[Clip]:
@@ -471,4 +471,4 @@ def _verdict(clip: str, runs: list[Run]) -> str | None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
