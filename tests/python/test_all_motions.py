@@ -16,7 +16,7 @@ import pytest
 from gait import Camera, Model, State, TrackStatus, Video
 from gait.bindings.abi import Flag, Mode
 from gait.bindings.estimate import Estimate
-from gait.bindings.model import CLASSES
+from gait.bindings.shipped import CLASSES
 from gait.cli import main
 from gait.errors import UserError
 from gait.io import keypoints_file

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 import gait.cli
-from gait.bindings.model import SHIPPED
+from gait.bindings.shipped import SHIPPED
 from gait.cli import COMMANDS, completion
 
 

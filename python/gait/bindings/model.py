@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gait.bindings import abi
 from gait.bindings.library import aligned, call, check, library, make
+from gait.bindings.shipped import SHIPPED, WALK
 from gait.bindings.state import State
 from gait.body.model_curves import slope_of
 from gait.camera.camera import Camera
@@ -24,9 +25,6 @@ from gait.io.files import require_file
 
 Array = NDArray[np.float64]
 
-#: Models in the package by name: the default; that of Ormoneit and others (2000), for paper mode; one with
-#: the motion classes walking, standing, walking backwards and running, from several laboratories.
-WALK, PAPER, CLASSES = SHIPPED = "walk", "paper", "classes"
 NOT_CYCLIC = "contains no cyclic model; learn it without --segments only"
 
 

@@ -10,6 +10,7 @@ import argparse
 import shlex
 from collections.abc import Iterator
 
+from gait.bindings.shipped import SHIPPED
 from gait.errors import UserError
 
 JSON = False
@@ -90,8 +91,6 @@ def script() -> str:
 def _named(command: str, action: argparse.Action) -> tuple[str, ...]:
     """Return words that an option takes besides files or numbers."""
     if action.dest == "model":
-        from gait.bindings.model import SHIPPED  # here, as it needs NumPy, which this command may lack
-
         return SHIPPED
     return ("all",) if (command, action.dest) == ("track", "people") else ()
 

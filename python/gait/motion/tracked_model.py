@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 
-from gait.bindings.model import SHIPPED, WALK, read_cyclic
+from gait.bindings.model import read_cyclic
+from gait.bindings.shipped import SHIPPED, WALK
 from gait.body.motion_classes import class_names
 from gait.errors import UserError
 from gait.io.track_file import Track

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from gait.bindings.model import WALK
+from gait.bindings.shipped import WALK
 from gait.io.track_file import Track
 from gait.motion.footfalls import STRIKE_SIDES, Events
 from gait.motion.norms import Compared

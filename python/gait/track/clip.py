@@ -14,7 +14,7 @@ from gait.bindings.abi import Mode, Term
 from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import Start, set_height
-from gait.bindings.model import CLASSES, WALK
+from gait.bindings.shipped import CLASSES, WALK
 from gait.bindings.start_fit import StartFit
 from gait.errors import UserError
 from gait.io.trc import write_trc

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from gait.bindings.abi import Mode
-from gait.bindings.model import PAPER, WALK
+from gait.bindings.shipped import PAPER, WALK
 
 if TYPE_CHECKING:
     from gait.body.measured import MeasuredBody

@@ -7,7 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from gait.bindings.model import SHIPPED, is_model
+from gait.bindings.model import is_model
+from gait.bindings.shipped import SHIPPED
 from gait.errors import UserError, unreadable
 from gait.learn.solve.readers import SUFFIXES
 
