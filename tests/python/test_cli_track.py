@@ -31,7 +31,6 @@ SUMMARY = [
     "ambiguous",
     "lost",
     "followed",
-    "against_walk",
     "memory_bytes",
     "digest",
     "verdict",

@@ -147,7 +147,9 @@ def commands(folder, name):
 
 
 COMMANDS = ["detect", "camera", "lift", "track"]
-FEET = "the person's feet are not in view for 0.3 s; film the whole person, feet included, for at least a se"
+FEET = (
+    "the person's feet are not in view for 0.3 s; film the whole person, feet included, for at least a second"
+)
 
 
 @pytest.mark.parametrize("command", COMMANDS[1:])

@@ -152,7 +152,6 @@ class Results:
             "wall_fps": self._count / self._wall,
             **{status.name.lower(): self._statuses.count(status) for status in TrackStatus},
             "followed": not self.hardly_followed(),
-            "against_walk": self.against_walk(),
             "memory_bytes": tracker.memory_bytes,
             "digest": f"{tracker.digest():016x}",
         }

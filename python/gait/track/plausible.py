@@ -62,7 +62,7 @@ class Plausibility:
         self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
         self.directions, self._travel = directions, 1.0 - belt
         self._cameras, self._backwards = cameras, backwards
-        self._wrong_way = self._new_wrong_way(backwards=True)  # as expected: this must not undo a start
+        self._wrong_way = self._new_wrong_way(backwards=True)  # an open direction must not undo a start
 
     def _new_wrong_way(self, backwards: bool) -> WrongWay:
         return WrongWay(self._keypoints, self.directions, self._cameras, backwards)
